@@ -37,7 +37,7 @@ pub struct StorageOptions {
 
 /// What was measured at one resolution with one storage.
 pub struct Measured {
-    /// Its name in metrics; that of the armadillo is that of what stands in for it, too.
+    /// The name in metrics, also of what stands in for the armadillo.
     shape: &'static str,
     title: String,
     n: usize,
@@ -104,8 +104,7 @@ impl StorageOptions {
             let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
             let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
-            let names = (CROSS.key, CROSS.key.to_owned());
-            measured.push(Measured::measure(names, n, case, session)?);
+            measured.push(Measured::measure(CROSS.key, n, case, session)?);
         }
         let mut mesh_options = self.mesh.clone();
         mesh_options.procedural |= quick;
@@ -126,9 +125,8 @@ impl StorageOptions {
                 let time = (rule, if quick { 2 } else { STEPS });
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
-                let case = Case::willmore("armadillo", initial, operator, scales(n), time);
-                let key = "armadillo";
-                measured.push(Measured::measure((key, title), n, case, session)?);
+                let case = Case::willmore(&title, initial, operator, scales(n), time);
+                measured.push(Measured::measure("armadillo", n, case, session)?);
             }
         }
         Ok(measured)
@@ -137,12 +135,13 @@ impl StorageOptions {
 
 impl Measured {
     fn measure<const D: usize>(
-        (shape, title): (&'static str, String),
+        shape: &'static str,
         n: usize,
         mut case: Case<D>,
         session: &mut Session,
     ) -> Result<Self> {
         case.measures.clear();
+        let title = case.shape.clone();
         let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
         let mut run = Run::new(case, &session.device)?;
         let cells = run.stored_cells() as f64;

@@ -44,12 +44,10 @@ fn edges_between_flat_sides_are_told_before_they_become_round() {
         let length = (x[0] - 1.0).abs() + x[1].abs() + x[2].abs();
         *x = [(x[0] - 1.0) / length, x[1] / length, x[2] / length];
     }
-    for (name, is_told) in [("octahedron.ply", true), ("ball.ply", false)] {
-        let mesh = if is_told {
-            octahedron.clone()
-        } else {
-            noisy_ball()
-        };
+    for (name, mesh, is_told) in [
+        ("octahedron.ply", octahedron, true),
+        ("ball.ply", noisy_ball(), false),
+    ] {
         surfaces::write(folder.path().join(name), &mesh).unwrap();
         let said = run(folder.path(), &["fair", name, "--cells", "32"]);
         assert!(said.status.success(), "{}", text(&said.stderr));

@@ -221,8 +221,9 @@ impl TriangleMesh {
         median.sqrt() / MEDIAN_OF_MEANS
     }
 
-    /// The part of the vertices that lie in a plane with their neighbours and those of these, to a ten-thousandth of `noise`, which
-    /// would leave as small a part. Meshes with flat sides and sharp edges have many.
+    /// The part of the vertices at which `|n . L L x|`, scaled as for [`Self::noise`] and with their own normals, is at most a ten-thousandth
+    /// of `noise`: these lie in a plane with their neighbours and the neighbours of those. Of a noisy mesh it is some ten-thousandth, and
+    /// large where flat sides meet in sharp edges.
     pub fn flat_part(&self, noise: f64) -> f64 {
         let found = self.squared_noise(&Umbrellas::of(self), &self.vertex_normals());
         let flat = found
