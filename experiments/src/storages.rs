@@ -14,6 +14,8 @@ const FIRST_STEP: f64 = 1.0 / 32.0;
 const STORAGES: [Storage; 2] = [Storage::Bricks, Storage::Dense];
 /// Controlled steps of the cross, on bricks.
 const CROSS_STEPS: usize = 32;
+/// Steps of surfaces and of the cross in a quick run.
+const QUICK_STEPS: usize = 2;
 /// Exponents are those from here to the finest.
 const COARSEST_FITTED: f64 = 128.0;
 
@@ -101,7 +103,7 @@ impl StorageOptions {
             let mut operator = operator(ACCURATE, &grid, &scales)?;
             operator.storage = Storage::Bricks;
             let steps = TimeSteps::controlled(ErrorControl::default());
-            let time = (steps.rule, if quick { 2 } else { CROSS_STEPS });
+            let time = (steps.rule, if quick { QUICK_STEPS } else { CROSS_STEPS });
             let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
             case.steps = steps;
             measured.push(Measured::measure(CROSS.key, n, case, session)?);
@@ -122,7 +124,7 @@ impl StorageOptions {
                     session.phase(distances, |stage| mesh.phase_field(grid, eps, &stage.bar))?;
                 drop(mesh);
                 let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
-                let time = (rule, if quick { 2 } else { STEPS });
+                let time = (rule, if quick { QUICK_STEPS } else { STEPS });
                 dense_or_bricks.storage = storage;
                 let operator = dense_or_bricks.clone();
                 let case = Case::willmore(&title, initial, operator, scales(n), time);
@@ -188,7 +190,8 @@ pub fn write(stored: &[Measured], session: &mut Session) -> Result<()> {
     for name in ["seconds", "peak_mib", "active_cells"] {
         session.metric(&format!("exponent.bricks.{name}"), exponent(stored, name))?;
     }
-    session.figure(figure(stored), "storages")
+    let steps = session.options.either(QUICK_STEPS, STEPS);
+    session.figure(figure(stored, steps), "storages")
 }
 
 fn surfaces(measured: &[Measured], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
@@ -206,7 +209,7 @@ fn exponent(measured: &[Measured], name: &str) -> Option<f64> {
 }
 
 /// Seconds and memory against `n`, a colour for each storage.
-fn figure(measured: &[Measured]) -> Figure {
+fn figure(measured: &[Measured], steps: usize) -> Figure {
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
             let points: Vec<_> = surfaces(measured, storage, name).collect();
@@ -226,7 +229,7 @@ fn figure(measured: &[Measured]) -> Figure {
         .with_panel(panel("size", "stored cells", "active_cells"))
         .with_shared_legend()
         .with_note(format!(
-            "{STEPS} steps of Willmore flow, tau = h⁴/32 doubled after every step, eps = 2h; {} threads.{}",
+            "{steps} steps of Willmore flow, tau = h⁴/32 doubled after every step, eps = 2h; {} threads.{}",
             rayon::current_num_threads(),
             fitted.unwrap_or_default()
         ))
