@@ -5,7 +5,7 @@
 
 use engine::METRICS;
 use pages::{
-    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits,
+    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits, thinned,
 };
 use report::{Axis, LineChart, Marker, Series};
 
@@ -234,17 +234,6 @@ impl Files<'_> {
     }
 }
 
-/// Every k-th item, with the smallest k that leaves at most `most`; the last one in any case.
-fn thinned<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
-    // One less, as the last one may come on top.
-    let every = items.len().div_ceil(most - 1).max(1);
-    let every = if items.len() <= most { 1 } else { every };
-    let last = items.len().saturating_sub(1);
-    (items.iter().enumerate())
-        .filter(move |(k, _)| k % every == 0 || *k == last)
-        .map(|(_, item)| item)
-}
-
 fn shortened(cell: &str) -> String {
     cell.parse().map_or_else(|_| cell.to_owned(), five_digits)
 }
@@ -285,22 +274,5 @@ fn in_words(known: &[(&str, &str)], key: &str) -> String {
     match known.iter().find(|(name, _)| *name == key) {
         Some((_, words)) => (*words).to_owned(),
         None => key.replace('_', " "),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_sequences_are_thinned_to_their_ends() {
-        for length in 0..400 {
-            let items: Vec<usize> = (0..length).collect();
-            let kept: Vec<usize> = thinned(&items, 60).copied().collect();
-            assert!(kept.len() <= 60, "{length}: {}", kept.len());
-            assert!(length > 60 || kept == items);
-            assert!(length == 0 || (kept[0] == 0 && kept[kept.len() - 1] == length - 1));
-            assert!(length < 100 || kept.len() > 30, "{length}: {}", kept.len());
-        }
     }
 }

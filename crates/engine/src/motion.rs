@@ -1,5 +1,7 @@
 //! Mean curvature flow and Willmore flow behind one interface.
 
+use std::any::Any;
+
 use fem::{FiniteElementStep, Statistics};
 use geometry::{Field, Stored};
 use model::Network;
@@ -8,8 +10,67 @@ use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow
 
 use crate::{Case, Error, Flow, Method, Order, Storage};
 
-/// The solver's flow of a case, between two steps.
-pub(crate) struct Motion<const D: usize> {
+/// The flow of a case, between two steps.
+pub(crate) trait Motion<const D: usize> {
+    /// A time step of this size that ends with these sizes held, or one step of mean curvature flow, whose size is that of its operator. A step
+    /// of second order is made only if `accept` takes it; the second value says so.
+    fn advance(
+        &mut self,
+        size: f64,
+        constraints: Constraints,
+        accept: &mut dyn FnMut(&StepRecord) -> bool,
+    ) -> Result<(Option<StepRecord>, bool), solver::Error>;
+
+    /// The phase field, as it is stored.
+    fn stored(&self) -> Result<Stored<D>, solver::Error>;
+
+    /// How many cells of the phase field are stored now, where that need not be all.
+    fn stored_cells(&self) -> Option<usize>;
+
+    /// All that the following steps depend on, after so many minimizations or steps and at this time.
+    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error>;
+
+    /// Work of the linear solves inside finite elements so far.
+    fn statistics(&self) -> Option<Statistics>;
+}
+
+/// The flow of a case, at a state of it or at its start.
+///
+/// The solver is generic in the dimension, and what is generic is compiled in every crate that calls it. So it is called by functions that
+/// are not, and is compiled here, once for all programs and tests.
+pub(crate) fn motion<const D: usize>(
+    case: &Case<D>,
+    state: Option<&FlowState<D>>,
+    device: &ComputeDevice,
+) -> Result<Box<dyn Motion<D>>, Error> {
+    fn in_plane(
+        case: &Case<2>,
+        state: Option<&FlowState<2>>,
+        device: &ComputeDevice,
+    ) -> Result<Box<dyn Motion<2>>, Error> {
+        Ok(Box::new(SolverFlow::new(case, state, device)?))
+    }
+    fn in_space(
+        case: &Case<3>,
+        state: Option<&FlowState<3>>,
+        device: &ComputeDevice,
+    ) -> Result<Box<dyn Motion<3>>, Error> {
+        Ok(Box::new(SolverFlow::new(case, state, device)?))
+    }
+    fn known<A: Any, B: Any>(value: &A) -> Option<&B> {
+        (value as &dyn Any).downcast_ref()
+    }
+    let motion: Box<dyn Any> = if let Some(case) = known(case) {
+        Box::new(in_plane(case, state.and_then(known), device)?)
+    } else {
+        let case = known(case).expect("a case is in the plane or in space");
+        Box::new(in_space(case, state.and_then(known), device)?)
+    };
+    Ok(*motion.downcast().expect("it has the dimension of the case"))
+}
+
+/// A flow of the solver.
+struct SolverFlow<const D: usize> {
     flow: Either<D>,
     /// The finite-element step inside, for its statistics.
     elements: Option<FiniteElementStep<D>>,
@@ -21,9 +82,8 @@ enum Either<const D: usize> {
     MeanCurvature(Box<MeanCurvatureFlow<D>>),
 }
 
-impl<const D: usize> Motion<D> {
-    /// The flow of a case, at a state of it or at its start.
-    pub(crate) fn new(
+impl<const D: usize> SolverFlow<D> {
+    fn new(
         case: &Case<D>,
         state: Option<&FlowState<D>>,
         device: &ComputeDevice,
@@ -84,14 +144,14 @@ impl<const D: usize> Motion<D> {
             order: case.steps.order,
         })
     }
+}
 
-    /// A time step of this size that ends with these sizes held, or one step of mean curvature flow, whose size is that of its operator. A step
-    /// of second order is made only if `accept` takes it; the second value says so.
-    pub(crate) fn advance(
+impl<const D: usize> Motion<D> for SolverFlow<D> {
+    fn advance(
         &mut self,
         size: f64,
         constraints: Constraints,
-        accept: impl FnOnce(&StepRecord) -> bool,
+        accept: &mut dyn FnMut(&StepRecord) -> bool,
     ) -> Result<(Option<StepRecord>, bool), solver::Error> {
         if let Either::Willmore(flow) = &mut self.flow {
             flow.constrain(constraints)?;
@@ -108,32 +168,28 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// The phase field, as it is stored.
-    pub(crate) fn stored(&self) -> Result<Stored<D>, solver::Error> {
+    fn stored(&self) -> Result<Stored<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.stored_field(),
             Either::MeanCurvature(flow) => Ok(Stored::whole(flow.field()?)),
         }
     }
 
-    /// How many cells of the phase field are stored now, where that need not be all.
-    pub(crate) fn stored_cells(&self) -> Option<usize> {
+    fn stored_cells(&self) -> Option<usize> {
         match &self.flow {
             Either::Willmore(flow) => Some(flow.stored_cells()),
             Either::MeanCurvature(_) => None,
         }
     }
 
-    /// All that the following steps depend on, after so many minimizations or steps and at this time.
-    pub(crate) fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
+    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.state(),
             Either::MeanCurvature(flow) => Ok(FlowState::new(flow.field()?, count, time)),
         }
     }
 
-    /// Work of the linear solves inside finite elements so far.
-    pub(crate) fn statistics(&self) -> Option<Statistics> {
+    fn statistics(&self) -> Option<Statistics> {
         self.elements.as_ref().map(FiniteElementStep::statistics)
     }
 }

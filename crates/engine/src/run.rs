@@ -11,7 +11,7 @@ use serde_json::Value;
 use solver::{FlowState, StepRecord};
 
 use crate::current::read;
-use crate::motion::Motion;
+use crate::motion::{Motion, motion};
 use crate::record::Values;
 use crate::steps::StepControl;
 use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
@@ -30,7 +30,7 @@ pub struct Run<const D: usize> {
     pub(crate) case: Case<D>,
     pub(crate) device: ComputeDevice,
     identity: OnceLock<Value>,
-    motion: Motion<D>,
+    motion: Box<dyn Motion<D>>,
     control: StepControl,
     /// How many steps the targets of what is held have gone, parts of steps included.
     ramped: f64,
@@ -231,7 +231,7 @@ impl<const D: usize> Run<D> {
         }
         loop {
             let mut shorter = None;
-            let accept = |made: &StepRecord| {
+            let accept = &mut |made: &StepRecord| {
                 shorter = self.control.shorter(made).filter(|_| halvings < most);
                 shorter.is_none()
             };
@@ -247,7 +247,7 @@ impl<const D: usize> Run<D> {
                     };
                     match before.as_ref().filter(|_| halvings < SHORTER) {
                         Some((state, _)) if part > 1.0 => {
-                            self.motion = Motion::new(&self.case, Some(state), &self.device)?;
+                            self.motion = motion(&self.case, Some(state), &self.device)?;
                         }
                         _ => {
                             return Ok(Attempt {
@@ -397,7 +397,7 @@ fn motion_in_memory<const D: usize>(
     case: &Case<D>,
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
-) -> Result<Motion<D>, Error> {
+) -> Result<Box<dyn Motion<D>>, Error> {
     let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
     let check = |stored| {
         if device.kind().is_cpu() {
@@ -408,9 +408,9 @@ fn motion_in_memory<const D: usize>(
     };
     if !takes_bricks || case.operator.storage == Storage::Dense {
         check(nodes)?;
-        return Motion::new(case, state, device);
+        return motion(case, state, device);
     }
-    let motion = Motion::new(case, state, device)?;
+    let motion = motion(case, state, device)?;
     // How many cells are stored is known only now; little is allocated yet.
     check(motion.stored_cells().unwrap_or(nodes))?;
     Ok(motion)

@@ -130,8 +130,7 @@ impl Store {
 
     fn write_tables<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
         let seconds: Vec<f64> = run.records.iter().map(|record| record.seconds).collect();
-        self.directory
-            .write_timings(&json!({ "seconds": seconds }))?;
+        self.directory.write_timings(&seconds)?;
         let table = to_csv(&run.records);
         self.directory
             .replace_file(METRICS, |out| out.write_all(table.as_bytes()))?;
@@ -172,9 +171,8 @@ pub fn initial<const D: usize>(
 pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
     let mut records: Vec<Record> =
         serde_json::from_str(&stored.state().text).map_err(|error| unreadable(stored, error))?;
-    let seconds = stored.timings()["seconds"].as_array();
-    for (record, seconds) in records.iter_mut().zip(seconds.into_iter().flatten()) {
-        record.seconds = seconds.as_f64().unwrap_or(0.0);
+    for (record, seconds) in records.iter_mut().zip(stored.timings()) {
+        record.seconds = *seconds;
     }
     Ok(records)
 }

@@ -57,7 +57,7 @@ mod viewer;
 pub use error::{Error, Result};
 pub use facts::{Facts, five_digits};
 pub use image::Image;
-pub use page::{Details, Figure, Frames, Page, Section};
+pub use page::{Details, Figure, Frames, Page, Section, thinned};
 pub use render::View;
 pub use table::Table;
 pub use text::Text;

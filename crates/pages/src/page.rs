@@ -305,6 +305,17 @@ impl Render for Frames {
     }
 }
 
+/// Every k-th item, with the smallest k that leaves at most `most` of them, which are two or more; the last one in any case.
+pub fn thinned<T>(items: &[T], most: usize) -> impl Iterator<Item = &T> {
+    // One less, as the last one may come on top.
+    let every = items.len().div_ceil(most - 1).max(1);
+    let every = if items.len() <= most { 1 } else { every };
+    let last = items.len().saturating_sub(1);
+    (items.iter().enumerate())
+        .filter(move |(k, _)| k % every == 0 || *k == last)
+        .map(|(_, item)| item)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,5 +325,17 @@ mod tests {
         assert_eq!(identifier("Willmore flow, n = 128"), "willmore-flow-n-128");
         assert_eq!(identifier("rocker_arm"), "rocker_arm");
         assert_eq!(identifier("<?\"!"), "section");
+    }
+
+    #[test]
+    fn long_sequences_are_thinned_to_their_ends() {
+        for length in 0..400 {
+            let items: Vec<usize> = (0..length).collect();
+            let kept: Vec<usize> = thinned(&items, 60).copied().collect();
+            assert!(kept.len() <= 60, "{length}: {}", kept.len());
+            assert!(length > 60 || kept == items);
+            assert!(length == 0 || (kept[0] == 0 && kept[kept.len() - 1] == length - 1));
+            assert!(length < 100 || kept.len() > 30, "{length}: {}", kept.len());
+        }
     }
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use files::{Disk, Storage, make_folders_on};
-use serde_json::Value;
 
 use crate::checkpoint::{self, Files, Kind, State};
 use crate::digest::{self, Seal};
@@ -76,7 +75,7 @@ impl RunDirectory {
             steps: Vec::new(),
             _lock: lock,
         };
-        run.write_timings(&Value::Null)?;
+        run.write_timings(&[])?;
         for (name, bytes) in files {
             run.write_file(name, |out| out.write_all(bytes))?;
         }
@@ -143,10 +142,10 @@ impl RunDirectory {
     }
 
     /// Replaces `timings.json`, the one file that may differ between two runs of the same
-    /// computation: wall times and the like, 4 MiB at most. It stands outside of the commits, and a
-    /// crash leaves the old one or the new one.
-    pub fn write_timings(&self, timings: &Value) -> Result<(), Error> {
-        let text = timings::encode(timings)?;
+    /// computation: wall times, such as those of the steps. It stands outside of the commits, and a crash
+    /// leaves the old one or the new one.
+    pub fn write_timings(&self, seconds: &[f64]) -> Result<(), Error> {
+        let text = timings::encode(seconds)?;
         self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
     }
 

@@ -38,7 +38,7 @@
 //! | `checkpoints/step-00000012.ckpt` | the state, and length and SHA-256 of every file | at each commit, the last two kept |
 //! | `config.toml`, `fields/`, … | whatever the caller writes | once |
 //! | `metrics.csv`, … | whatever the caller derives from the state | replaced at any time |
-//! | `timings.json` | wall times and the like, and its own SHA-256 | replaced at any time |
+//! | `timings.json` | wall times, and its own SHA-256 | replaced at any time |
 //! | `lock` | nothing; locked while a process works here | once |
 //!
 //! Resuming removes checkpoints and temporary files that are no part of the run; files of others stay.
@@ -55,7 +55,7 @@
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
 //! - Readers never trust a number in a file before its length agrees. They take at most 58 times the
 //!   length of a checkpoint (twice, unless its arrays are constant), twenty times its list of files (64 MiB at most), 160 times its notes (at
-//!   most [`State::MAX_NOTES`]) or `timings.json` (at most 4 MiB), and 64 KiB for anything else.
+//!   most [`State::MAX_NOTES`]), forty times `timings.json`, and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
 mod checkpoint;

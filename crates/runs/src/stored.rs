@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use files::{Disk, Storage};
-use serde_json::Value;
 
 use crate::checkpoint::{self, Header, Kind, State};
 use crate::{Error, RunDirectory, digest, folder, lock, names, timings};
@@ -16,7 +15,7 @@ pub struct StoredRun {
     run: RunDirectory,
     state: State<'static>,
     finished: bool,
-    timings: Value,
+    timings: Vec<f64>,
     /// Whether there is damage, which is to be given up.
     recovered: bool,
     leftovers: Vec<PathBuf>,
@@ -127,8 +126,8 @@ impl StoredRun {
         text.map_err(|error| Error::damaged(self.run.path.join(name), error.to_string()))
     }
 
-    /// What was last given to [`RunDirectory::write_timings`], null if nothing was.
-    pub fn timings(&self) -> &Value {
+    /// What was last given to [`RunDirectory::write_timings`], in seconds.
+    pub fn timings(&self) -> &[f64] {
         &self.timings
     }
 
@@ -214,7 +213,10 @@ fn commits(folder: &Path) -> Result<Vec<u64>, Error> {
 }
 
 /// Checks everything. Of the steps, those are left whose checkpoints are part of the run.
-fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<((Header, State<'static>), Value), Error> {
+fn check(
+    folder: &Path,
+    steps: &mut Vec<u64>,
+) -> Result<((Header, State<'static>), Vec<f64>), Error> {
     let newest = intact(folder, steps[0])?;
     let kept = checkpoint::kept(newest.0.finished);
     for &older in steps[1..].iter().take(kept - 1) {

@@ -1,41 +1,50 @@
-//! `timings.json`: wall times and the like, with their own checksum.
+//! `timings.json`: wall times, with their own checksum.
 
-use std::io::Read;
 use std::path::Path;
 
-use serde_json::Value;
+use serde::{Deserialize, Serialize};
 
 use crate::digest::{self, fingerprint};
 use crate::{Error, names};
 
-const LONGEST: u64 = 4 << 20;
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed {
+    #[serde(rename = "sha256")]
+    _checksum: String,
+    content: Content<Vec<f64>>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Content<T> {
+    seconds: T,
+}
 
 /// The text of the file, if it can be read again.
-pub(crate) fn encode(timings: &Value) -> Result<String, Error> {
-    let text = seal(timings);
-    if text.len() as u64 > LONGEST || unseal(text.as_bytes()).is_none() {
-        return Err(Error::file(names::TIMINGS, "it is too long or too deep"));
+pub(crate) fn encode(seconds: &[f64]) -> Result<String, Error> {
+    if let Some(other) = seconds.iter().find(|seconds| !seconds.is_finite()) {
+        let reason = format!("{other} is no wall time");
+        return Err(Error::file(names::TIMINGS, &reason));
     }
-    Ok(text)
+    Ok(seal(seconds))
 }
 
-pub(crate) fn read(folder: &Path) -> Result<Value, Error> {
+pub(crate) fn read(folder: &Path) -> Result<Vec<f64>, Error> {
     let path = folder.join(names::TIMINGS);
-    let mut bytes = Vec::new();
-    let read = digest::open(&path)?.take(LONGEST).read_to_end(&mut bytes);
-    read.map_err(files::Error::of("read", &path))?;
-    unseal(&bytes).ok_or_else(|| digest::wrong_checksum(&path))
+    unseal(&digest::read(&path)?).ok_or_else(|| digest::wrong_checksum(&path))
 }
 
-fn seal(content: &Value) -> String {
-    let content = format!("{content:#}").replace('\n', "\n  ");
+fn seal(seconds: &[f64]) -> String {
+    let content = serde_json::to_string_pretty(&Content { seconds });
+    let content = content.expect("it is numbers").replace('\n', "\n  ");
     let sha256 = fingerprint(&content);
     format!("{{\n  \"sha256\": \"{sha256}\",\n  \"content\": {content}\n}}\n")
 }
 
-fn unseal(bytes: &[u8]) -> Option<Value> {
-    let mut sealed: Value = serde_json::from_slice(bytes).ok()?;
-    let content = sealed.get_mut("content")?.take();
+fn unseal(bytes: &[u8]) -> Option<Vec<f64>> {
+    let Sealed { content, .. } = serde_json::from_slice(bytes).ok()?;
     // There is one text for every content, so that a change anywhere is noticed.
-    (seal(&content).as_bytes() == bytes).then_some(content)
+    let seconds = content.seconds;
+    (seal(&seconds).as_bytes() == bytes).then_some(seconds)
 }

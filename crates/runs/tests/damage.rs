@@ -360,8 +360,7 @@ fn misuse_is_refused_and_changes_nothing() {
     }
     let absent = run.adopt_file("fields/absent").unwrap_err();
     assert!(matches!(absent, Error::Damaged { .. }) && absent.to_string().contains("is missing"));
-    assert!(run.write_timings(&deep).is_err());
-    assert!(run.write_timings(&json!("x".repeat(4 << 20))).is_err());
+    assert!(run.write_timings(&[1.0, f64::NAN]).is_err());
     // A failing producer leaves the name free.
     let failed = run.write_file("a/b", |_| Err(std::io::Error::other("no")));
     assert!(matches!(failed, Err(Error::Io(_))));

@@ -38,8 +38,7 @@ impl Fixture {
         let storage = Arc::new(Quick);
         let mut run = RunDirectory::create_on(storage, &folder, &files, &state).unwrap();
         run.replace_file("c.csv", |_| Ok(())).unwrap();
-        run.write_timings(&json!({ "seconds": [1.5, 2e-300], "on": "\n\"" }))
-            .unwrap();
+        run.write_timings(&[1.5, 2e-300, 0.0]).unwrap();
         run.finish(&state).unwrap();
         Self {
             _root: root,
@@ -190,7 +189,7 @@ fn fuzzing_changed_timings_are_refused() {
     forged.run(
         |bytes| run.read_timings(bytes),
         |bytes, stored| {
-            let timings = stored.timings().clone();
+            let timings = stored.timings().to_vec();
             let (resumed, _) = stored.resume().unwrap();
             resumed.write_timings(&timings).unwrap();
             let text = fs::read(run.folder.join("timings.json")).unwrap();
@@ -326,4 +325,11 @@ fn the_worst_files_stay_within_the_limit() {
         assert!(result.is_ok(), "{result:?}");
         assert!(peak <= LIMIT.times * bytes.len(), "{peak}");
     }
+    fs::write(run.checkpoint(), &original).unwrap();
+    let seconds = "0,".repeat(500_000);
+    let timings = format!(r#"{{"sha256":"","content":{{"seconds":[{seconds}0]}}}}"#);
+    let (result, peak) = peak_of(|| run.read_timings(timings.as_bytes()));
+    println!("{} bytes of timings: {peak}", timings.len());
+    assert!(result.is_err());
+    assert!(peak <= 40 * timings.len(), "{peak}");
 }

@@ -137,7 +137,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
             write_metrics(&mut run, &state)?;
             run.commit(&state)?;
             toy.committed.set(Some(state.step));
-            run.write_timings(&json!({ "seconds": std::process::id() }))?;
+            run.write_timings(&[f64::from(std::process::id())])?;
         }
         if interrupted {
             return Ok(());
