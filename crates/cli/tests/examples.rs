@@ -27,8 +27,9 @@ const COMMANDS: [&str; 12] = [
 ];
 
 /// What makes a command quick.
-fn quick(command: &str) -> &'static [&'static str] {
+fn quick(command: &str, line: &str) -> &'static [&'static str] {
     match command {
+        "fair" if line.contains(".nii") => &["--cells", "32"],
         "flow" | "mcf" | "inpaint" => &["--cells", "48", "--steps", "3"],
         "fair" => &["--cells", "48"],
         "check" => &["--cells", "24"],
@@ -54,7 +55,7 @@ fn inputs(folder: &Path) {
     draw(&at("damage.png"), &disc(160.0, 20.0));
     let figure = surfaces::samples::figure(48).unwrap().into_mesh();
     surfaces::write(at("bunny.ply"), &figure).unwrap();
-    let mut scan = surfaces::samples::lever(64).unwrap().into_mesh();
+    let mut scan = surfaces::samples::lever(48).unwrap().into_mesh();
     let side = scan.bounding_box().unwrap().longest_side();
     for x in scan.vertices.iter_mut().flatten() {
         *x *= 10.0 / side;
@@ -136,7 +137,7 @@ fn every_example_does_what_a_person_wants() {
         let typed = line.split(['>', '#']).next().unwrap();
         let mut words: Vec<&str> = typed.split_whitespace().collect();
         let command = words[0];
-        words.extend(quick(command));
+        words.extend(quick(command, line));
         if command == "resume" && line.contains("--steps") {
             words.extend(["--steps", "5"]);
         }
