@@ -34,39 +34,25 @@ pub(crate) trait Motion<const D: usize> {
     fn statistics(&self) -> Option<Statistics>;
 }
 
+/// Makes the flow of a case, at a state of it or at its start.
+type Make<const D: usize> =
+    fn(&Case<D>, Option<&FlowState<D>>, &ComputeDevice) -> Result<Box<dyn Motion<D>>, Error>;
+
+/// A [`Make`] for each dimension. The solver is generic in it, and what is generic is compiled in every crate that calls it; what a static
+/// names is compiled here, once for all programs and tests.
+static MAKES: [&(dyn Any + Send + Sync); 2] = [
+    &(SolverFlow::motion as Make<2>),
+    &(SolverFlow::motion as Make<3>),
+];
+
 /// The flow of a case, at a state of it or at its start.
-///
-/// The solver is generic in the dimension, and what is generic is compiled in every crate that calls it. So it is called by functions that
-/// are not, and is compiled here, once for all programs and tests.
 pub(crate) fn motion<const D: usize>(
     case: &Case<D>,
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
 ) -> Result<Box<dyn Motion<D>>, Error> {
-    fn in_plane(
-        case: &Case<2>,
-        state: Option<&FlowState<2>>,
-        device: &ComputeDevice,
-    ) -> Result<Box<dyn Motion<2>>, Error> {
-        Ok(Box::new(SolverFlow::new(case, state, device)?))
-    }
-    fn in_space(
-        case: &Case<3>,
-        state: Option<&FlowState<3>>,
-        device: &ComputeDevice,
-    ) -> Result<Box<dyn Motion<3>>, Error> {
-        Ok(Box::new(SolverFlow::new(case, state, device)?))
-    }
-    fn known<A: Any, B: Any>(value: &A) -> Option<&B> {
-        (value as &dyn Any).downcast_ref()
-    }
-    let motion: Box<dyn Any> = if let Some(case) = known(case) {
-        Box::new(in_plane(case, state.and_then(known), device)?)
-    } else {
-        let case = known(case).expect("a case is in the plane or in space");
-        Box::new(in_space(case, state.and_then(known), device)?)
-    };
-    Ok(*motion.downcast().expect("it has the dimension of the case"))
+    let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
+    make.expect("a case is in the plane or in space")(case, state, device)
 }
 
 /// A flow of the solver.
@@ -83,6 +69,14 @@ enum Either<const D: usize> {
 }
 
 impl<const D: usize> SolverFlow<D> {
+    fn motion(
+        case: &Case<D>,
+        state: Option<&FlowState<D>>,
+        device: &ComputeDevice,
+    ) -> Result<Box<dyn Motion<D>>, Error> {
+        Ok(Box::new(Self::new(case, state, device)?))
+    }
+
     fn new(
         case: &Case<D>,
         state: Option<&FlowState<D>>,

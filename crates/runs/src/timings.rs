@@ -8,15 +8,11 @@ use crate::digest::{self, fingerprint};
 use crate::{Error, names};
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Sealed {
-    #[serde(rename = "sha256")]
-    _checksum: String,
     content: Content<Vec<f64>>,
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Content<T> {
     seconds: T,
 }
