@@ -186,7 +186,7 @@ impl Loaded {
         Ok(match &self.shape {
             Shape::Distance(distance) => {
                 bar.set_length(grid.cells() as u64);
-                let within = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
+                let within = distance.sample_within(PURE_BEYOND * eps, grid, &|| bar.inc(1))?;
                 within.map(profile)
             }
             Shape::Volume(values, VolumeKind::SignedDistance) => values.map(profile).into(),
@@ -217,5 +217,5 @@ fn volume(path: &Path, grid: Grid<3>, holds: VolumeKind) -> Result<Field<3>> {
 
 pub fn sampled(distance: &MeshDistance, grid: Grid<3>, bar: &ProgressBar) -> Result<Field<3>> {
     bar.set_length(grid.cells() as u64);
-    Ok(distance.sample(grid, || bar.inc(1))?)
+    Ok(distance.sample(grid, &|| bar.inc(1))?)
 }

@@ -91,7 +91,7 @@ impl StorageOptions {
         let [curves, surfaces] = cells.map(distinct);
         let mut measured = Vec::new();
         let forget_memory = || {
-            memory::release_freed();
+            memory::release_kept();
             memory::forget_peak();
         };
         for n in curves {

@@ -155,7 +155,7 @@ impl Surface {
         let folder = format!("{}-{}", self.key, case.operator.key());
         let mut samples = Samples::every(usize::MAX);
         samples.also = self.shown.iter().map(|(step, _)| *step).collect();
-        memory::release_freed();
+        memory::release_kept();
         memory::forget_peak();
         let trajectory = session.trajectory(&run, case, &folder, &samples)?;
         let mut flowed = Flowed {
@@ -164,7 +164,7 @@ impl Surface {
             snapshots: Vec::new(),
             peak_mib: memory::peak_mib(),
         };
-        memory::release_freed();
+        memory::release_kept();
         let last = flowed.trajectory.steps();
         let steps = samples.also.into_iter().filter(|step| *step < last);
         let steps = steps.chain([last]);
@@ -202,7 +202,7 @@ impl Flowed {
         let w_scheme = record.map_or_else(at_start, Record::willmore_energy);
         let measured = self.trajectory.measures(step)?;
         let w = energy_by_elements(case, || Ok(u.field()?))?;
-        memory::release_freed();
+        memory::release_kept();
         let mut measures = Numbers::from([
             ("perimeter", measured["perimeter"]),
             ("volume", measured["volume"]),
@@ -246,7 +246,7 @@ impl Flowed {
 
     /// Pictures of the shown steps with this side in pixels (less in a quick run), all in one framing, each also as a file of its own.
     pub fn pictures(&self, stage: &Stage<'_>, side: u32) -> Result<Vec<Raster>> {
-        memory::release_freed();
+        memory::release_kept();
         let usual = (side, Quality::Standard);
         let (side, quality) = stage.options.either((120, Quality::Draft), usual);
         // Scenes are made twice rather than kept: one takes several times the memory of its phase field.

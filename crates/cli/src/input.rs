@@ -577,7 +577,7 @@ impl<'a> Reader<'a> {
         let progress = self.messages.progress();
         let bar = progress.bar("signed distance", grid.cells() as u64);
         let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
-        let distance = distance.sample_within(PURE_BEYOND * eps, grid, || bar.inc(1))?;
+        let distance = distance.sample_within(PURE_BEYOND * eps, grid, &|| bar.inc(1))?;
         bar.finish();
         progress.clear();
         let (distance, mended) = surfaces::mend_signs(distance);

@@ -46,7 +46,7 @@ impl Storage {
         let needed = Self::bytes(grid.len(), stored);
         let short = |available: &f64| needed > *available;
         if memory::available().is_some_and(|available| short(&available)) {
-            memory::release_freed();
+            memory::release_kept();
         }
         match memory::available().filter(short) {
             Some(available) => {

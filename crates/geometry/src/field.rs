@@ -16,7 +16,13 @@ impl<const D: usize> Field<D> {
     ///
     /// The values are not checked; see [`Field::check_finite`].
     pub fn from_fn(grid: Grid<D>, f: impl Fn([f64; D]) -> f64 + Sync) -> Self {
-        let values = parallel::map(grid.len(), 1, &|i| f(grid.node(i)));
+        let mut values = vec![0.0; grid.len()];
+        // Rows, as functions may be much work: the distance to an outline of many curves, for instance.
+        parallel::over_chunks(&mut values, grid.cells(), &|first, row| {
+            for (value, node) in row.iter_mut().zip(first..) {
+                *value = f(grid.node(node));
+            }
+        });
         let nodes = grid.into();
         Self { nodes, values }
     }

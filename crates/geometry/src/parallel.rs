@@ -1,12 +1,17 @@
 //! Loops on all cores whose results do not depend on the number of threads.
 //!
-//! The work is called through a pointer, so that a loop is compiled once and not again for every closure: these loops were a third of the
-//! code of a program.
+//! The work is called through a pointer, so that the loop on all cores is compiled once and not again for every closure and type: these
+//! loops were a third of the code of a program.
+
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
 /// Values per task, and terms per partial sum; fixed, so that the order of additions is.
 pub(crate) const CHUNK: usize = 4096;
+/// Tasks per thread, so that one that takes long delays little.
+const PARTS_PER_THREAD: usize = 16;
 
 /// Writes the values from an index on.
 pub type Reader<'a> = dyn Fn(usize, &mut [f64]) + Sync + 'a;
@@ -17,20 +22,15 @@ pub fn over_chunks<T: Send>(
     chunk: usize,
     work: &(dyn Fn(usize, &mut [T]) + Sync + '_),
 ) {
-    let chunks = values.par_chunks_mut(chunk).enumerate();
-    chunks.for_each(|(number, part)| work(number * chunk, part));
+    let parts: Vec<Mutex<&mut [T]>> = values.chunks_mut(chunk).map(Mutex::new).collect();
+    over(parts.len(), 1, &|number| {
+        work(number * chunk, &mut lock(&parts[number]));
+    });
 }
 
 /// `f(0), f(1), ...`, where one value alone is worth a call. At least `share` of them make a task.
 pub fn map<T: Send>(len: usize, share: usize, f: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
-    let indices = (0..len).into_par_iter().with_min_len(share);
-    indices.map(f).collect()
-}
-
-/// Calls `work` with each index. At least `share` of them make a task.
-pub(crate) fn over(len: usize, share: usize, work: &(dyn Fn(usize) + Sync)) {
-    let indices = (0..len).into_par_iter().with_min_len(share);
-    indices.for_each(work);
+    collect(len, share, &|indices, made| made.extend(indices.map(f)))
 }
 
 /// Those of `f(0), f(1), ...` that there are, in this order.
@@ -39,8 +39,41 @@ pub fn filter_map<T: Send>(
     share: usize,
     f: &(dyn Fn(usize) -> Option<T> + Sync),
 ) -> Vec<T> {
+    collect(len, share, &|indices, made| {
+        made.extend(indices.filter_map(f));
+    })
+}
+
+/// What `work` appends for each range of indices below `len`, in their order.
+fn collect<T: Send>(
+    len: usize,
+    share: usize,
+    work: &(dyn Fn(Range<usize>, &mut Vec<T>) + Sync),
+) -> Vec<T> {
+    let part = share.max(len.div_ceil(PARTS_PER_THREAD * rayon::current_num_threads()));
+    let parts: Vec<Mutex<Vec<T>>> = (0..len.div_ceil(part.max(1)))
+        .map(|_| Mutex::default())
+        .collect();
+    over(parts.len(), 1, &|number| {
+        let first = number * part;
+        work(first..len.min(first + part), &mut lock(&parts[number]));
+    });
+    let mut all = Vec::new();
+    for made in parts {
+        all.append(&mut made.into_inner().unwrap_or_else(PoisonError::into_inner));
+    }
+    all
+}
+
+/// A part of the result, which one task alone writes: a task that panics ends the loop.
+fn lock<T>(part: &Mutex<T>) -> MutexGuard<'_, T> {
+    part.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Calls `work` with each index. At least `share` of them make a task.
+pub(crate) fn over(len: usize, share: usize, work: &(dyn Fn(usize) + Sync)) {
     let indices = (0..len).into_par_iter().with_min_len(share);
-    indices.filter_map(f).collect()
+    indices.for_each(work);
 }
 
 /// `f(0), f(1), ...`, where one value is little work.

@@ -75,6 +75,15 @@ macro_rules! real {
 real!(f32);
 real!(f64);
 
+impl<T: Real> Shared<T> {
+    /// Forgets all that is kept here; what is in use stays with its users, and the rest is made again when it is needed.
+    pub(crate) fn clear(&self) {
+        lock(&self.plans).clear();
+        lock(&self.symbols).clear();
+        *lock(&self.scratch) = Vec::new();
+    }
+}
+
 /// A plan for the real transform of grids of one shape.
 ///
 /// Spectra are stored column by column of the first axis: entry `(c, k0)` at `c * n0 + k0`, where `c` runs over

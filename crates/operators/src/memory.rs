@@ -1,4 +1,6 @@
-//! Memory of the process: what the allocator keeps, and how much is in use.
+//! Memory of the process: what is kept for later use, and how much is in use.
+
+use crate::fft::Real;
 
 /// Tells the allocator of glibc to keep memory that was freed. By default it returns vectors of megabytes to the system at once
 /// and gets them back page by page, which costs flows half of their time. Other allocators keep memory anyway. To be called first in a
@@ -17,8 +19,11 @@ pub fn keep_freed() {
     }
 }
 
-/// Gives kept memory back to the system, for instance between two computations with large vectors of different sizes.
-pub fn release_freed() {
+/// Gives all memory back to the system that is only kept for later use: spectra of kernels, plans and buffers of convolutions, and
+/// what the allocator keeps. For instance between two computations with large vectors of different sizes.
+pub fn release_kept() {
+    f32::shared().clear();
+    f64::shared().clear();
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
         #[allow(unsafe_code, reason = "a call into the C library without pointers")]
@@ -60,11 +65,27 @@ pub fn pages() -> Option<u64> {
     fields.split_whitespace().nth(7)?.parse().ok()
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
     use super::*;
+    use crate::convolution::kernel_symbol;
 
     #[test]
+    fn what_was_released_is_made_again_with_the_same_bits() {
+        // No other test has a grid of this shape.
+        let shape = [22, 26];
+        let kernel = [0.1, -0.2, 0.3, 0.5, 0.7, 0.2, 0.4, 0.1, 0.6];
+        let before = kernel_symbol(&shape, &kernel, 3);
+        let kept = std::sync::Arc::downgrade(&before);
+        let bits = before.as_ref().clone();
+        release_kept();
+        drop(before);
+        assert!(kept.upgrade().is_none(), "the spectrum is still kept");
+        assert_eq!(*kernel_symbol(&shape, &kernel, 3), bits);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
     fn touching_new_memory_takes_pages() {
         const SIZE: usize = 64 << 20;
         let before = pages().unwrap();

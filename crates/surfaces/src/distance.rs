@@ -82,7 +82,7 @@ impl MeshDistance {
     ///
     /// # Errors
     /// [`geometry::Error::NonFinite`] for nodes so far away that squares of distances overflow.
-    pub fn sample(&self, grid: Grid<3>, layer_done: impl Fn() + Sync) -> Result<Field<3>, Error> {
+    pub fn sample(&self, grid: Grid<3>, layer_done: &(dyn Fn() + Sync)) -> Result<Field<3>, Error> {
         let cells = grid.cells();
         let mut values = vec![0.0; grid.len()];
         let layers = values.par_chunks_mut(cells * cells).enumerate();
@@ -105,7 +105,7 @@ impl MeshDistance {
         &self,
         reach: f64,
         grid: Grid<3>,
-        part_done: impl Fn() + Sync,
+        part_done: &(dyn Fn() + Sync),
     ) -> Result<Stored<3>, Error> {
         let Some(bricks) = self.bricks_within(reach, &grid) else {
             let all = self.sample(grid, part_done)?;

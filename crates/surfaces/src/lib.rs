@@ -29,7 +29,7 @@
 //!     let eps = 2.0 * coarse.spacing();
 //!     let placement = Placement::fit(&ball.bounding_box(), &coarse, 1.2)?;
 //!     let distance = MeshDistance::new(&ball.placed(&placement));
-//!     let s = distance.sample(coarse, || ())?;
+//!     let s = distance.sample(coarse, &|| ())?;
 //!     let u = s.map(|s| optimal_profile(s, eps));
 //!     let (again, _) = ClosedMesh::new(phase_field_surface(&u, eps)?)?;
 //!     println!("volume {:.3}", again.volume()); // 4/3 pi 0.6^3 = 0.905

@@ -209,7 +209,7 @@ fn sampling_is_the_distance_at_every_node() {
         let count = || {
             layers.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         };
-        let sampled = distance.sample(grid, count).unwrap();
+        let sampled = distance.sample(grid, &count).unwrap();
         assert_eq!(layers.into_inner(), 24);
         let direct = Field::from_fn(grid, |x| distance.signed_distance(x));
         for (index, (a, b)) in sampled.values().iter().zip(direct.values()).enumerate() {
@@ -217,7 +217,7 @@ fn sampling_is_the_distance_at_every_node() {
         }
         // Whole blocks are further away than this, and others in part.
         let reach = 0.1;
-        let within = distance.sample_within(reach, grid, || ()).unwrap();
+        let within = distance.sample_within(reach, grid, &|| ()).unwrap();
         assert!(within.values().len() < grid.len());
         for (a, b) in within.field().unwrap().values().iter().zip(direct.values()) {
             assert!((a - b.clamp(-reach, reach)).abs() < 1e-15, "{a} for {b}");
@@ -225,7 +225,7 @@ fn sampling_is_the_distance_at_every_node() {
     }
     let far = grid.with_origin([1e200; 3]).unwrap();
     let distance = MeshDistance::new(&closed(cube(0.5)));
-    let error = distance.sample(far, || ()).unwrap_err();
+    let error = distance.sample(far, &|| ()).unwrap_err();
     assert!(error.to_string().contains("node 0 is NaN"), "{error}");
 }
 
@@ -236,7 +236,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
             let lever = samples::lever(48).unwrap();
-            let sampled = MeshDistance::new(&lever).sample(grid, || ()).unwrap();
+            let sampled = MeshDistance::new(&lever).sample(grid, &|| ()).unwrap();
             (lever, sampled)
         })
     };

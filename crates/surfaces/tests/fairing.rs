@@ -183,7 +183,7 @@ fn a_fairing_takes_off_noise_before_the_flow_begins() {
     let eps = 2.0 * grid.spacing();
     let placement = Placement::about([0.0; 3], 1.0).unwrap();
     let distance = MeshDistance::new(&fairing.start)
-        .sample(grid, || ())
+        .sample(grid, &|| ())
         .unwrap();
     let start = distance.map(|s| optimal_profile(s, eps));
     let followed = fairing.follow(placement, &start, eps).unwrap();

@@ -256,7 +256,7 @@ fn a_mesh_survives_the_way_through_a_phase_field() {
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
     let distance = MeshDistance::new(&lever);
-    let u = distance.sample(grid, || ()).unwrap();
+    let u = distance.sample(grid, &|| ()).unwrap();
     let u = u.map(|s| geometry::optimal_profile(s, eps));
     let mesh = closed(phase_field_surface(&u, eps).unwrap());
     assert_eq!((mesh.components(), mesh.genus()), (1, 1));
@@ -337,7 +337,7 @@ fn a_lattice_need_not_be_a_cube() {
     // As of a field, but for the place and the size.
     let field = samples::figure(48).unwrap();
     let grid = Grid::centred(24, 1.0).unwrap();
-    let s = MeshDistance::new(&field).sample(grid, || ()).unwrap();
+    let s = MeshDistance::new(&field).sample(grid, &|| ()).unwrap();
     let (one, other) = (
         isosurface(&s).unwrap(),
         lattice_surface([24; 3], s.values()),

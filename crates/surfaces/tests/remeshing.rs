@@ -193,7 +193,7 @@ fn triangles_are_well_shaped() {
             assert_well_shaped(name, &u);
         }
         for (name, distance) in [("figure", &figure), ("lever", &lever)] {
-            let s = distance.sample(grid, || ()).unwrap();
+            let s = distance.sample(grid, &|| ()).unwrap();
             assert_well_shaped(name, &s.map(|s| optimal_profile(s, eps)));
         }
     }

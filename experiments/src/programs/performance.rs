@@ -164,7 +164,7 @@ impl Measurement {
         let grid = *case.grid();
         let n = grid.spacing().recip().round();
         let name = format!("{case_name}, n = {n}");
-        memory::release_freed();
+        memory::release_kept();
         memory::forget_peak();
         let mut run = Run::new(case.clone(), &session.device)?;
         let mut warm = None;

@@ -141,7 +141,7 @@ impl Segmented {
         ];
         let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
             session.phase(format!("{}: {words}", self.name), |stage| {
-                let distance = MeshDistance::new(start).sample(self.grid, || ())?;
+                let distance = MeshDistance::new(start).sample(self.grid, &|| ())?;
                 let mut case = fairing_flow(self.name, distance)?;
                 case.measures = vec![Measure::displacement(&case.initial, case.scales.eps)];
                 case.stops = vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)];
