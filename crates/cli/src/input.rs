@@ -562,8 +562,8 @@ impl<'a> Reader<'a> {
         });
         if body.specks > 0 {
             self.messages.warn(&format!(
-                "{} parts or holes of a few voxels are left out, and their volume goes to the others",
-                body.specks
+                "{} parts or holes of a few voxels are left out, which changes the volume by {:+} voxels",
+                body.specks, body.filled
             ));
         }
         let space = Space {

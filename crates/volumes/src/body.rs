@@ -45,12 +45,14 @@ impl Inside {
 pub struct Body {
     /// Its surface.
     pub surface: ClosedMesh,
-    /// Its volume: that of its voxels, or for a threshold that inside the surface.
+    /// Its volume: that of its voxels without the specks, or for a threshold that inside the surface.
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub voxel: f64,
-    /// How many parts and holes are left out.
+    /// How many parts and holes are left out,
     pub specks: usize,
+    /// and how many voxels this adds: those of the holes, less those of the parts.
+    pub filled: isize,
 }
 
 impl Volume {
@@ -90,7 +92,7 @@ impl Volume {
     /// move towards the middle of their neighbours again and again while the volume stays that of the voxels, but each stays
     /// between the centres of the voxels whose difference put it there. (S. F. F. Gibson: Constrained elastic surface nets. MICCAI 1998.)
     /// A body of few voxels across becomes thinner by up to a voxel where others are thick. Parts and holes inside whose surface there are
-    /// fewer than eight voxels are taken for noise and left out, if there are larger ones; the others take their volume.
+    /// fewer than eight voxels are taken for noise and left out, if there are larger ones: their voxels do not count.
     ///
     /// # Errors
     /// [`Error::NothingInside`], [`Error::Surfaces`].
@@ -98,20 +100,57 @@ impl Volume {
         let part = Part::of(self, inside)?;
         let (lattice, _) = ClosedMesh::new(part.surface(self, inside)?)?;
         let cell = self.voxel_volume();
-        let (surface, specks) = match inside {
-            Inside::Above(_) => (ClosedMesh::new(self.placed(lattice.mesh()))?.0, 0),
-            Inside::Label(_) => {
-                let large = lattice.without_small_parts(SPECK)?;
-                let surface = self.without_steps(large.mesh(), part.count as f64 * cell)?;
-                (surface, lattice.components() - large.components())
-            }
+        let voxel = cell.cbrt();
+        let Inside::Label(_) = inside else {
+            let surface = ClosedMesh::new(self.placed(lattice.mesh()))?.0;
+            return Ok(Body {
+                volume: surface.volume(),
+                surface,
+                voxel,
+                specks: 0,
+                filled: 0,
+            });
         };
+        let large = lattice.without_small_parts(SPECK)?;
+        let voxels = self.voxels_within(large.mesh(), inside);
+        let surface = self.without_steps(large.mesh(), voxels * cell)?;
         Ok(Body {
             volume: surface.volume(),
             surface,
-            voxel: cell.cbrt(),
-            specks,
+            voxel,
+            specks: lattice.components() - large.components(),
+            filled: voxels as isize - part.count as isize,
         })
+    }
+
+    /// The number of voxels within parts of the surface of a label. That has a vertex half-way between two voxels of a row of which one is
+    /// inside: the voxels of a row are the sum of these places, those where the surface is entered taken as negative.
+    fn voxels_within(&self, parts: &TriangleMesh, inside: Inside) -> f64 {
+        let between = |x: &&[f64; 3]| x.map(is_half) == [false, false, true];
+        let place = |x: &[f64; 3]| {
+            let before = [x[0].round(), x[1].round(), x[2].floor()];
+            let sign = self.depth(before.map(|v| v as isize), inside).signum();
+            sign * x[2]
+        };
+        let places = parts.vertices.iter().filter(between).map(place);
+        places.sum::<f64>().round()
+    }
+
+    /// Positive inside and negative outside, also outside of the volume.
+    fn depth(&self, voxel: [isize; 3], inside: Inside) -> f64 {
+        let size = self.size();
+        let nearest = [0, 1, 2].map(|axis| voxel[axis].clamp(0, size[axis] as isize - 1));
+        let value = self.value(nearest.map(|i| i as usize));
+        let depth = match inside {
+            Inside::Label(_) if inside.holds(value) => 0.5,
+            Inside::Label(_) => -0.5,
+            Inside::Above(threshold) => value - threshold,
+        };
+        if nearest == voxel {
+            depth
+        } else {
+            -depth.abs()
+        }
     }
 
     /// A surface in voxels, in the coordinates of the volume.
@@ -134,11 +173,7 @@ impl Volume {
         let mesh = self.placed(lattice);
         let to_voxels = self.frame.matrix3.inverse();
         // A vertex is in the middle of an edge along one axis or more, where its coordinates are halves.
-        let halves = |x: &[f64; 3]| {
-            x.iter()
-                .filter(|v| (v.fract().abs() - 0.5).abs() < 0.25)
-                .count()
-        };
+        let halves = |x: &[f64; 3]| x.iter().filter(|v| is_half(**v)).count();
         let to_centres: Vec<f64> = (lattice.vertices.iter())
             .map(|x| 0.5 * (halves(x) as f64).sqrt())
             .collect();
@@ -156,6 +191,11 @@ impl Volume {
             None => Ok(ClosedMesh::new(mesh)?.0),
         }
     }
+}
+
+/// Half-way between two voxels, up to rounding.
+fn is_half(coordinate: f64) -> bool {
+    (coordinate.fract().abs() - 0.5).abs() < 0.25
 }
 
 /// The part of a volume where something is inside.
@@ -197,26 +237,12 @@ impl Part {
 
     /// The surface by marching tetrahedra, in voxels of the volume.
     fn surface(&self, volume: &Volume, inside: Inside) -> Result<TriangleMesh, Error> {
-        let size = volume.size();
-        let depth = |voxel: [isize; 3]| {
-            let nearest = [0, 1, 2].map(|axis| voxel[axis].clamp(0, size[axis] as isize - 1));
-            let value = volume.value(nearest.map(|i| i as usize));
-            let depth = match inside {
-                Inside::Label(_) if inside.holds(value) => 0.5,
-                Inside::Label(_) => -0.5,
-                Inside::Above(threshold) => value - threshold,
-            };
-            if nearest == voxel {
-                depth
-            } else {
-                -depth.abs()
-            }
-        };
         // Negative inside, the last axis fastest.
         let [_, ny, nz] = self.size;
         let value = |node: usize| {
             let offset = [node / (ny * nz), node / nz % ny, node % nz];
-            -depth([0, 1, 2].map(|axis| self.first[axis] + offset[axis] as isize))
+            let voxel = [0, 1, 2].map(|axis| self.first[axis] + offset[axis] as isize);
+            -volume.depth(voxel, inside)
         };
         let nodes = 0..self.size.iter().product();
         let values: Vec<f64> = nodes.map(value).collect();
