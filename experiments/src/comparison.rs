@@ -347,7 +347,7 @@ impl Comparison<'_> {
         for ((label, reached), style) in self.second_order.iter().zip(styles) {
             let series = Series::of(label, reached, |at| [time(at.mark), at.distance]);
             let series = series.with_colour(Colour::Grey).with_style(style);
-            exact = exact.with_series(series.with_marker(Marker::Circle));
+            exact = exact.with_curves([series.with_marker(Marker::Circle)]);
             entries.push(LegendEntry::line(label, Colour::Grey, style));
         }
         let reference = self.about_the_reference();
@@ -378,8 +378,7 @@ impl Comparison<'_> {
         for (run, _) in &rows {
             for &step in &shown {
                 let curve = run.loops(step)?.filled(Colour::LightGrey);
-                let panel = Shapes::new("").with_window([-half, half], [-half, half]);
-                let mut panel = panel.with_curve(curve);
+                let mut panel = Shapes::new("", [[-half, half]; 2]).with_curve(curve);
                 if !run.errors.is_empty() {
                     let reference = self.reference().loops(step)?;
                     panel = panel.with_curve(reference.with_colour(1).with_width(1.0));
@@ -414,7 +413,7 @@ impl Comparison<'_> {
                 });
             for name in MEASURES {
                 sheet = sheet.metric(&format!("{name}.step{k}"), |run| {
-                    run.trajectory.measures(k).ok()?.get(name).copied()
+                    run.trajectory.measures(k)?.get(name).copied()
                 });
             }
         }

@@ -172,11 +172,9 @@ impl<const D: usize> AtRest<D> {
 
     /// The shape, or the plane through its axis, and the exact curve, in a window of so many radii.
     pub fn panel(&self, caption: String, plane: &Field<2>, radii: f64) -> Shapes {
-        let radius = self.equilibrium.radius;
-        let ends = [-radii * radius, radii * radius];
+        let half = radii * self.equilibrium.radius;
         let exact = self.equilibrium.outline();
-        Shapes::new(caption)
-            .with_window(ends, ends)
+        Shapes::new(caption, [[-half, half]; 2])
             .with_curve(look::outline(plane).filled(Colour::LightGrey))
             .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0))
     }
@@ -210,7 +208,7 @@ pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
         .keyed(|one, name| format!("{}.{name}", one.equilibrium.key))
         .text("equilibrium", |one| one.equilibrium.title.as_str())
         .measure(energy, ("energy / ball's", energies), AtRest::energy)
-        .measure("exact", ("exact", energies), AtRest::exact_energy)
+        .measure("exact", ("exact energy", energies), AtRest::exact_energy)
         .column("error in %", Fixed(2), |one| 100.0 * error(one));
     for (k, name) in sizes.into_iter().enumerate() {
         let (metric, head) = (format!("{name}_drift"), format!("drift of the {name}"));
@@ -221,11 +219,11 @@ pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
     let [tension, pressure] = [("tension", forces), ("pressure", forces)];
     sheet
         .measure("tension", tension, |one| one.last(|made| made.tension))
-        .measure("exact_tension", ("exact", forces), |one| {
+        .measure("exact_tension", ("exact tension", forces), |one| {
             one.equilibrium.tension
         })
         .measure("pressure", pressure, |one| one.last(|made| made.pressure))
-        .measure("exact_pressure", ("exact", forces), |one| {
+        .measure("exact_pressure", ("exact pressure", forces), |one| {
             one.equilibrium.pressure
         })
         .measure("steps", ("steps", Shortest), |one| one.trajectory.steps())

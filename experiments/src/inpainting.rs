@@ -131,7 +131,7 @@ pub fn finish<const D: usize>(
         let point = |r: &Record| Some([r.time, r.willmore_energy()?]);
         let points: Vec<_> = one.trajectory.records.iter().filter_map(point).collect();
         let (time, w) = (Axis::log("time t"), Axis::linear("Willmore energy w"));
-        LineChart::new(one.shape.title, time, w).with_series(Series::new("", points))
+        LineChart::new(one.shape.title, time, w).with_curves([Series::new("", points)])
     });
     let energies = Figure::new("Willmore energy while inpainting", 2).with_panels(energies);
     session.figure(energies, "energies")?;

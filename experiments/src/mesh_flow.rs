@@ -77,7 +77,7 @@ impl MeshFlow {
         };
         let title = format!("Willmore flow: {}", surface.title);
         let (surfaces, time) = ([(surface, initial)], (time_steps, steps));
-        setting.run(session, &title, &surfaces, &variants, time, remarks)
+        setting.run(session, &title, &surfaces, time, remarks)
     }
 
     /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is

@@ -109,7 +109,8 @@ impl MeshOptions {
         }
         let (mesh, title, mut about) = if self.procedural {
             let title = known.procedural_title.to_owned();
-            ((known.procedural)(PROCEDURAL_CELLS)?, title, json!({}))
+            let about = json!({ "built_in": title });
+            ((known.procedural)(PROCEDURAL_CELLS)?, title, about)
         } else {
             self.read(known)?
         };
@@ -148,15 +149,6 @@ impl MeshOptions {
         let mut options = self.clone();
         options.procedural |= self.volume.is_none() && self.find(known).is_none();
         options.load(known, grid)
-    }
-
-    /// The file that [`Self::load_or_built_in`] takes, with its checksum, or the built-in shape.
-    pub fn about(&self, known: &KnownMesh) -> Result<Value> {
-        let found = self.volume.clone().or_else(|| self.find(known));
-        match found.filter(|_| !self.procedural) {
-            Some(path) => Ok(about_file(&path)?.1),
-            None => Ok(known.procedural_title.into()),
-        }
     }
 
     fn find(&self, known: &KnownMesh) -> Option<PathBuf> {

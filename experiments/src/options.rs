@@ -29,10 +29,7 @@ pub struct RunOptions {
 
 impl RunOptions {
     pub fn open_device(&self) -> Result<ComputeDevice> {
-        Ok(match &self.device {
-            Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
-            None => ComputeDevice::default_compiled()?,
-        })
+        Ok(ComputeDevice::named(self.device.as_deref())?)
     }
 
     /// One of these, the first if this is a quick run.

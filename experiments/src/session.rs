@@ -133,7 +133,7 @@ impl Session {
     /// Writes a table for programs alone.
     pub fn csv<R>(&self, sheet: Sheet<'_, R>, stem: &str) -> Result<()> {
         let (table, _) = sheet.finish()?;
-        self.output.write(&format!("{stem}.csv"), table.to_csv()?)?;
+        self.output.write(&format!("{stem}.csv"), table.to_csv())?;
         Ok(())
     }
 

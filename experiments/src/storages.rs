@@ -1,6 +1,6 @@
 //! What a surface and a curve cost by what is stored of their phase fields: the whole grid, or bricks near them.
 
-use crate::meshes::{ARMADILLO, MeshOptions};
+use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
 use crate::truth::CROSS;
@@ -68,16 +68,34 @@ impl StorageOptions {
         require(cells.all(possible), message)
     }
 
-    /// What is measured, for the manifest.
-    pub fn about(&self) -> Result<Value> {
+    /// What is measured, for the manifest; a mesh that cannot be read is refused.
+    pub fn about(&self, run: &RunOptions) -> Result<Value> {
+        let [curve_cells, surface_cells] = self.cells(run);
+        let mesh = match surface_cells.first() {
+            Some(&n) => self.mesh(run, n)?.1.about,
+            None => Value::Null,
+        };
         Ok(json!({
-            "mesh": self.mesh.about(&ARMADILLO)?, "surface_cells": self.surface_cells, "dense_up_to": self.dense_up_to,
-            "curve_cells": self.curve_cells,
+            "mesh": mesh, "surface_cells": surface_cells, "dense_up_to": self.dense_up_to, "curve_cells": curve_cells,
         }))
     }
 
-    /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution; the built-in figure in a quick run, or if it
-    /// is not here.
+    /// Cells per unit length of the cross and of the armadillo.
+    fn cells(&self, run: &RunOptions) -> [Vec<usize>; 2] {
+        let usual = [&self.curve_cells[..], &self.surface_cells];
+        run.either([&[64][..], &[32, 64]], usual).map(distinct)
+    }
+
+    /// The grid of the armadillo, and its mesh there: the built-in figure in a quick run, or if it is not here.
+    fn mesh(&self, run: &RunOptions, n: usize) -> Result<(Grid<3>, Loaded)> {
+        let mut options = self.mesh.clone();
+        options.procedural |= run.quick;
+        let grid = centred_box(n, options.box_side(&ARMADILLO))?;
+        let mesh = options.load_or_built_in(&ARMADILLO, &grid)?;
+        Ok((grid, mesh))
+    }
+
+    /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution.
     pub fn measure(
         &self,
         networks: &NetworkOptions,
@@ -86,9 +104,7 @@ impl StorageOptions {
         let networks = networks.load(&[needed_network()])?;
         let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
-        let usual = [&self.curve_cells[..], &self.surface_cells];
-        let cells = session.options.either([&[64][..], &[32, 64]], usual);
-        let [curves, surfaces] = cells.map(distinct);
+        let [curves, surfaces] = self.cells(&session.options);
         let mut measured = Vec::new();
         let forget_memory = || {
             memory::release_kept();
@@ -108,16 +124,13 @@ impl StorageOptions {
             case.steps = steps;
             measured.push(Measured::measure(CROSS.key, n, case, session)?);
         }
-        let mut mesh_options = self.mesh.clone();
-        mesh_options.procedural |= quick;
         for n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
                     continue;
                 }
                 forget_memory();
-                let grid = centred_box(n, self.mesh.box_side(&ARMADILLO))?;
-                let mesh = mesh_options.load_or_built_in(&ARMADILLO, &grid)?;
+                let (grid, mesh) = self.mesh(&session.options, n)?;
                 let (title, eps) = (mesh.title.clone(), scales(n).eps);
                 let distances = format!("{title}, n = {n}, {storage}: signed distance");
                 let initial =

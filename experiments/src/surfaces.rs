@@ -134,7 +134,7 @@ pub struct Snapshot {
     pub time: f64,
     pub measures: Numbers,
     /// The Willmore energy that the paper reports.
-    paper: Option<f64>,
+    pub paper: Option<f64>,
     pub caption: String,
     pub tubes: Vec<Tube>,
 }
@@ -197,10 +197,10 @@ impl Flowed {
         let file = format!("{}.ply", self.file(step));
         surfaces::write(stage.output.subfolder("meshes")?.path(&file)?, mesh.mesh())?;
         let record = self.trajectory.record(step);
-        let at_rest = |first: &Record| first.minimization.map(|made| made.energy_at_rest());
-        let at_start = || self.trajectory.records.first().and_then(at_rest);
+        let first = self.trajectory.records.first();
+        let at_start = || first.and_then(Record::energy_at_rest);
         let w_scheme = record.map_or_else(at_start, Record::willmore_energy);
-        let measured = self.trajectory.measures(step)?;
+        let measured = record.map_or(&self.trajectory.start, |record| &record.measures);
         let w = energy_by_elements(case, || Ok(u.field()?))?;
         memory::release_kept();
         let mut measures = Numbers::from([
@@ -301,7 +301,7 @@ fn in_words(steps: StepRule) -> String {
 }
 
 impl Setting {
-    /// Lets all surfaces flow by several methods in so many time steps, and ends the program: writes a figure with a row of pictures for each
+    /// Lets all surfaces flow by all methods in so many time steps, and ends the program: writes a figure with a row of pictures for each
     /// run, the table of the shown steps, the records of all steps and the metrics. `remarks` looks at the flows, may add to captions, pictures
     /// and metrics, and says what else the note of the figure should say.
     pub fn run(
@@ -309,13 +309,12 @@ impl Setting {
         mut session: Session,
         title: &str,
         surfaces: &[(Surface, Stored<3>)],
-        variants: &[(Method, Scheme)],
         time: (TimeSteps, usize),
         remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,
     ) -> Result<()> {
         let mut all = Vec::new();
         for (surface, initial) in surfaces {
-            for &variant in variants {
+            for &variant in &self.variants {
                 let mut surface = surface.clone();
                 if variant != PAPERS {
                     // The paper reports energies of its own scheme.

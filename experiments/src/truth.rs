@@ -335,8 +335,8 @@ pub struct Reached {
     pub seconds: f64,
     /// and steps.
     pub steps: usize,
-    /// The estimated time error of controlled steps.
-    pub estimated: f64,
+    /// The estimated time error of controlled steps; none after fewer than three.
+    pub estimated: Option<f64>,
 }
 
 impl Reached {
@@ -365,7 +365,7 @@ impl Reached {
             hvp: total_hvp(so_far),
             seconds: so_far.iter().map(|record| record.seconds).sum(),
             steps: so_far.len(),
-            estimated: estimated_time_error(so_far).unwrap_or(0.0),
+            estimated: estimated_time_error(so_far),
         })
     }
 
@@ -376,8 +376,8 @@ impl Reached {
             ("distance_to_exact", self.distance),
             ("hvp_total", self.hvp),
             ("steps", self.steps as f64),
-            ("estimated_error", self.estimated),
         ]);
+        numbers.extend(self.estimated.map(|error| ("estimated_error", error)));
         record(session, key, self.mark, &numbers)
     }
 
@@ -399,7 +399,7 @@ impl Reached {
             hvp: double.hvp + single.hvp,
             seconds: double.seconds + single.seconds,
             steps: double.steps + single.steps,
-            estimated: double.estimated.max(single.estimated),
+            estimated: (double.estimated.zip(single.estimated)).map(|(a, b)| a.max(b)),
         }
     }
 }

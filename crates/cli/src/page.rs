@@ -104,9 +104,7 @@ impl Files<'_> {
                 drawings.push((label.clone(), Image::from_bytes(name, &bytes)?));
             }
         }
-        let frames =
-            (!drawings.is_empty()).then(|| Frames::new("The shape over the steps", drawings));
-        Ok(frames.transpose()?)
+        Ok((!drawings.is_empty()).then(|| Frames::new("The shape over the steps", drawings)))
     }
 
     fn surfaces(&self) -> Result<Option<Viewer>> {
@@ -167,8 +165,7 @@ impl Files<'_> {
             2 => [("length", "Length"), ("area", "Area")],
             _ => [("area", "Area"), ("volume", "Volume")],
         };
-        let at_rest = |first: &Record| Some(first.minimization?.energy_at_rest());
-        let start = self.records.first().and_then(at_rest);
+        let start = self.records.first().and_then(Record::energy_at_rest);
         let mut curves = vec![("Energy", self.points(start, Record::willmore_energy))];
         for (name, title) in columns {
             let start = self.run.state().notes["start"][name].as_f64();
@@ -183,7 +180,7 @@ impl Files<'_> {
                 series = series.with_marker(Marker::Circle);
             }
             figure = figure.with_panel(
-                LineChart::new(title, Axis::linear("step"), Axis::linear("")).with_series(series),
+                LineChart::new(title, Axis::linear("step"), Axis::linear("")).with_curves([series]),
             );
         }
         let image = Image::from_bytes("the plot of the steps", figure.to_svg()?.as_bytes())?;

@@ -108,14 +108,10 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     }
 
     /// Names and bytes of the files that it takes to resume a run,
-    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
-        Ok(Vec::new())
-    }
+    fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>>;
 
     /// and what becomes of them there.
-    fn restore(&mut self, _: &StoredRun) -> Result<()> {
-        Ok(())
-    }
+    fn restore(&mut self, stored: &StoredRun) -> Result<()>;
 }
 
 /// Whether a file is written at the end of a run.

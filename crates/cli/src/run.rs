@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use engine::{Checkpoints, Ending, Event, Observer, Storage, Store, estimated_time_error};
+use engine::{Checkpoints, Event, Observer, Storage, Store, estimated_time_error};
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
@@ -26,8 +26,6 @@ pub struct Plan<const D: usize, O> {
     pub format: Option<String>,
     pub messages: MessageOptions,
 }
-
-const DELAY: Duration = Duration::from_millis(200);
 
 impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     /// What is kept with the run.
@@ -77,25 +75,24 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             topology: None,
         };
         let observers: &mut [&mut dyn Observer<D>] = &mut [&mut bar, &mut pictures];
-        let ending = run.advance(Some(&mut store), observers, &interrupt)?;
+        let ended = run.advance(Some(&mut store), observers, &interrupt)?;
         let seconds = clock.elapsed().as_secs_f64();
-        let outcome = match ending {
-            Ending::Stopped(_) => self.finish(store, &run)?,
-            Ending::Interrupted => {
-                drop(store);
-                let (steps, time) = (run.steps(), run.time());
-                json!({ "command": self.command, "finished": false, "steps": steps, "time": time })
-            }
+        let outcome = if ended.is_some() {
+            self.finish(store, &run)?
+        } else {
+            drop(store);
+            let (steps, time) = (run.steps(), run.time());
+            json!({ "command": self.command, "finished": false, "steps": steps, "time": time })
         };
         if !self.options.no_page {
             page::write(&RunDirectory::open(&folder)?)?;
         }
         bar.finish();
         progress.clear();
-        self.tell(outcome, &folder, run.ended(), seconds);
-        match ending {
-            Ending::Stopped(_) => Ok(()),
-            Ending::Interrupted => Err(Error::Interrupted),
+        self.tell(outcome, &folder, ended, seconds);
+        match ended {
+            Some(_) => Ok(()),
+            None => Err(Error::Interrupted),
         }
     }
 
@@ -129,10 +126,9 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             let (pictures, series) = frames(directory.path(), run.records())?;
             // There are none of a shape that is never there.
             if !pictures.is_empty() {
-                let animation = render::animation(&pictures, DELAY)?;
-                directory.write_file(presentation::ANIMATION, |out| out.write_all(&animation))?;
-                directory
-                    .write_file(presentation::SERIES, |out| out.write_all(series.as_bytes()))?;
+                let animation = render::animation(&pictures)?;
+                directory.write_file(presentation::ANIMATION, &animation)?;
+                directory.write_file(presentation::SERIES, series.as_bytes())?;
             }
         }
         // Touching sheets have no topology; that is no reason not to flow.
@@ -142,7 +138,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let energy = last.and_then(Record::willmore_energy);
         let is_willmore = case.energy.is_willmore();
         let spheres = energy.filter(|_| D == 3 && is_willmore);
-        let first_energy = first.and_then(|first| Some(first.minimization?.energy_at_rest()));
+        let first_energy = first.and_then(Record::energy_at_rest);
         let target = case.stops.iter().find_map(|stop| match stop {
             Stop::Energy(target) => Some(*target),
             Stop::EnergyRatio(part) => Some(part * first_energy?),
@@ -185,7 +181,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             }
         }
         let text = format!("{outcome:#}\n");
-        directory.write_file(presentation::SUMMARY, |out| out.write_all(text.as_bytes()))?;
+        directory.write_file(presentation::SUMMARY, text.as_bytes())?;
         store.finish(run)?;
         Ok(outcome)
     }
@@ -202,12 +198,10 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         if has_interface(u) {
             let (start, eps) = (&run.case().initial, run.case().scales.eps);
             let picture = self.presentation.picture(start, u, eps)?.to_png()?;
-            directory.write_file(&format!("{stem}.png"), |out| out.write_all(&picture))?;
+            directory.write_file(&format!("{stem}.png"), &picture)?;
             if let Some(faired) = faired {
                 let figure = faired.displacement.to_svg()?;
-                directory.write_file(presentation::DISPLACEMENT, |out| {
-                    out.write_all(figure.as_bytes())
-                })?;
+                directory.write_file(presentation::DISPLACEMENT, figure.as_bytes())?;
             }
             self.write_shape(u, eps, faired, stem, directory)?;
         }
@@ -284,15 +278,16 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
         }
         let (case, u, plan) = (event.run.case(), event.run.stored(), self.plan);
         let eps = case.scales.eps;
+        let failed = |error: Error| engine::Error::Observer(error.into());
         if step == 0 {
             let written = plan.write_shape(u, eps, None, presentation::START, run);
-            written.map_err(engine::Error::observer)?;
+            written.map_err(failed)?;
         }
         let frames = plan.options.frames;
         if frames.is_some_and(|every| step.is_multiple_of(every)) {
             let name = presentation::frame(step);
             let written = plan.write(event.run, None, &name, run);
-            written.map_err(engine::Error::observer)?;
+            written.map_err(failed)?;
         }
         // Touching sheets have no topology.
         let topology = plan.presentation.topology(u, eps).ok();

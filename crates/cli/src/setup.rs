@@ -20,10 +20,7 @@ pub fn check_eps_over_h(eps_over_h: f64) -> Result<()> {
 impl CommonOptions {
     /// Opens the device and notes its name.
     pub fn open_device(&mut self) -> Result<ComputeDevice> {
-        let device = match &self.device {
-            Some(name) => ComputeDevice::open(name.parse::<DeviceKind>()?)?,
-            None => ComputeDevice::default_compiled()?,
-        };
+        let device = ComputeDevice::named(self.device.as_deref())?;
         self.device = Some(device.kind().name().to_owned());
         Ok(device)
     }

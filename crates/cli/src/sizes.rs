@@ -1,6 +1,6 @@
 //! Area and volume that are held: from the options to targets, and a start that has them.
 
-use engine::{Flow, Held, Helfrich, Target};
+use engine::{Held, Target};
 
 use crate::cli::{FlowOptions, MessageOptions};
 use crate::prelude::*;
@@ -73,21 +73,14 @@ pub fn round_edges<const D: usize>(
         return Ok(());
     }
     let targets = options.held(start, eps, None)?.targets();
+    let steps = (StepRule::Constant(eps.powi(4)), ROUNDING);
     let case = Case {
-        shape: "edges".to_owned(),
-        initial: start.clone(),
-        region: None,
-        energy: Helfrich::default(),
         held: Held {
             perimeter: None,
             volume: holds_volume.then(|| Target::keep(sharp.volume)),
         },
-        flow: Flow::Willmore,
-        operator,
-        scales,
-        steps: StepRule::Constant(eps.powi(4)).into(),
-        stops: vec![Stop::Steps(ROUNDING)],
         measures: Vec::new(),
+        ..Case::willmore("edges", start.clone(), operator, scales, steps)
     };
     let mut run = Run::new(case, device)?;
     while run.step()?.is_some() {

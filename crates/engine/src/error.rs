@@ -49,8 +49,6 @@ pub enum Error {
          same box"
     )]
     Incomparable { cells: usize, reference: usize },
-    #[error("there is no step {step} in a run of {steps} steps")]
-    NoSuchStep { step: usize, steps: usize },
     /// A stored run of another case, one that is over, or one that cannot be read.
     #[error("the run in {} cannot go on: {reason}", path.display())]
     Stored { path: PathBuf, reason: String },
@@ -70,11 +68,4 @@ pub enum Error {
     Operators(#[from] operators::Error),
     #[error(transparent)]
     Geometry(#[from] geometry::Error),
-}
-
-impl Error {
-    /// Wraps what an observer of another crate raised.
-    pub fn observer(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
-        Self::Observer(error.into())
-    }
 }

@@ -82,7 +82,7 @@ pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, to_csv,
     total_hvp,
 };
-pub use run::{Ending, Run};
+pub use run::Run;
 pub use solver::Helfrich;
 pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::Stop;

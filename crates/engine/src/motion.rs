@@ -74,14 +74,6 @@ impl<const D: usize> SolverFlow<D> {
         state: Option<&FlowState<D>>,
         device: &ComputeDevice,
     ) -> Result<Box<dyn Motion<D>>, Error> {
-        Ok(Box::new(Self::new(case, state, device)?))
-    }
-
-    fn new(
-        case: &Case<D>,
-        state: Option<&FlowState<D>>,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
         let (params, operator) = (case.params(), &case.operator);
         let whole = match (case.flow, operator.method) {
             (Flow::Willmore, Method::Hybrid) => None,
@@ -132,11 +124,11 @@ impl<const D: usize> SolverFlow<D> {
                 Either::MeanCurvature(Box::new(flow))
             }
         };
-        Ok(Self {
+        Ok(Box::new(Self {
             flow,
             elements,
             order: case.steps.order,
-        })
+        }))
     }
 }
 

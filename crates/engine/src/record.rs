@@ -9,7 +9,7 @@ use solver::StepRecord;
 pub type Values = BTreeMap<String, f64>;
 
 /// One minimization of Willmore flow, or one step of mean curvature flow: a time step or a substep of one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Number of the time step to which it belongs, from 1.
     pub step: usize,
@@ -44,6 +44,11 @@ impl Record {
     /// The Willmore energy as the scheme measures it.
     pub fn willmore_energy(&self) -> Option<f64> {
         self.minimization.map(|made| made.willmore_energy)
+    }
+
+    /// The Willmore energy before the step, as the scheme measures it.
+    pub fn energy_at_rest(&self) -> Option<f64> {
+        self.minimization.map(|made| made.energy_at_rest())
     }
 
     /// Hessian-vector products; those on coarser grids count by their share of this grid's unknowns.
@@ -145,47 +150,26 @@ pub fn to_csv(records: &[Record]) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use solver::{Exit, NewtonInfo, PhaseTimes, Start};
+    use solver::NewtonInfo;
 
     /// A minimization of a size that took so many Newton steps.
     pub(crate) fn record(tau: f64, newton: usize) -> Record {
         Record {
             step: 1,
-            completes_step: false,
-            time: 0.0,
             tau,
-            halvings: 0,
-            far: false,
-            refused_hvp: 0.0,
-            moved: 0.0,
-            travelled: 0.0,
             minimization: Some(StepRecord {
-                step: 1,
-                time: 0.0,
                 tau,
                 energy_before: 1.0,
                 energy: 1.0,
                 willmore_energy: 1.0,
-                tension: None,
-                pressure: None,
-                start: Start::default(),
-                estimates: None,
                 newton: NewtonInfo {
-                    exit: Exit::Converged,
                     newton,
-                    hvp: 0,
-                    values: 0,
-                    gradients: 0,
-                    negative_curvature: 0,
-                    energy_before: 1.0,
-                    energy: 1.0,
-                    estimate: 0.0,
+                    ..NewtonInfo::default()
                 },
-                seconds: 0.0,
-                times: PhaseTimes::default(),
+                ..StepRecord::default()
             }),
             measures: Values::from([("volume".to_owned(), 0.5)]),
-            seconds: 1.0,
+            ..Record::default()
         }
     }
 

@@ -16,15 +16,6 @@ use crate::record::Values;
 use crate::steps::StepControl;
 use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
 
-/// Why [`Run::advance`] returned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ending {
-    /// This stop rule holds.
-    Stopped(Stop),
-    /// The run was interrupted; it can be resumed.
-    Interrupted,
-}
-
 /// A case that is being computed: its flow, its place in the time steps, and the records so far.
 pub struct Run<const D: usize> {
     pub(crate) case: Case<D>,
@@ -122,12 +113,7 @@ impl<const D: usize> Run<D> {
         }
         let clock = Instant::now();
         self.whole.take();
-        let Attempt {
-            halvings,
-            far,
-            refused_hvp,
-            minimization,
-        } = self.attempt()?;
+        let made = self.attempt()?;
         self.torn = true;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
         let moved = self.distance(&now, self.stored());
@@ -137,18 +123,18 @@ impl<const D: usize> Run<D> {
         let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
         let count = self.records.len() + 1;
-        let time = minimization.map_or(count as f64 * mcf_step, |made| made.time);
+        let time = (made.minimization).map_or(count as f64 * mcf_step, |step| step.time);
         let mut record = Record {
             step: self.control.step(),
             completes_step: false,
             time,
-            tau: minimization.map_or(mcf_step, |made| made.tau),
-            halvings,
-            far,
-            refused_hvp,
+            tau: made.minimization.map_or(mcf_step, |step| step.tau),
+            halvings: made.halvings,
+            far: made.far,
+            refused_hvp: made.refused_hvp,
             moved,
             travelled,
-            minimization,
+            minimization: made.minimization,
             measures: values(&self.current(), time)?,
             seconds,
         };
@@ -160,8 +146,9 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
-    /// Makes all steps until a stop rule holds or `interrupt` is set, and calls the observers after each. With a store, checkpoints are
-    /// written, the last one also when a step fails; the store is left open, so that files can be added to it.
+    /// Makes all steps until a stop rule holds, which is returned, or `interrupt` is set, and calls the observers after each. An interrupted
+    /// run can be resumed. With a store, checkpoints are written, the last one also when a step fails; the store is left open, so that files
+    /// can be added to it.
     ///
     /// # Errors
     /// As [`Self::step`], and the errors of observers and of the store.
@@ -170,13 +157,13 @@ impl<const D: usize> Run<D> {
         mut store: Option<&mut Store>,
         observers: &mut [&mut dyn Observer<D>],
         interrupt: &Interrupt,
-    ) -> Result<Ending, Error> {
+    ) -> Result<Option<Stop>, Error> {
         if self.records.is_empty() {
             self.tell(store.as_deref_mut(), observers)?;
         }
         loop {
-            if let Some(stop) = self.ended {
-                return Ok(Ending::Stopped(stop));
+            if self.ended.is_some() {
+                return Ok(self.ended);
             }
             if let Err(error) = self.step() {
                 if let Some(store) = store.filter(|_| !self.torn) {
@@ -190,7 +177,7 @@ impl<const D: usize> Run<D> {
                 store.commit(self, interrupted)?;
             }
             if interrupted && self.ended.is_none() {
-                return Ok(Ending::Interrupted);
+                return Ok(None);
             }
         }
     }

@@ -74,8 +74,7 @@ impl Stop {
                 (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
             }
             Self::EnergyRatio(ratio) => {
-                let first = run.records.first().and_then(|r| r.minimization);
-                let first = first.map(|made| made.energy_at_rest());
+                let first = run.records.first().and_then(Record::energy_at_rest);
                 let last = last.and_then(Record::willmore_energy);
                 (first.zip(last)).is_some_and(|(first, last)| last <= ratio * first)
             }

@@ -132,9 +132,7 @@ impl Store {
         let seconds: Vec<f64> = run.records.iter().map(|record| record.seconds).collect();
         self.directory.write_timings(&seconds)?;
         let table = to_csv(&run.records);
-        self.directory
-            .replace_file(METRICS, |out| out.write_all(table.as_bytes()))?;
-        Ok(())
+        Ok((self.directory).replace_file(METRICS, table.as_bytes())?)
     }
 }
 

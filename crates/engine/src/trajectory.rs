@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::record::Values;
 use crate::store::{self, Checkpoints, check_identity};
-use crate::{Case, Ending, Error, Observer, Record, Run, Samples, Stop, Store};
+use crate::{Case, Error, Observer, Record, Run, Samples, Stop, Store};
 
 /// One checkpoint a minute.
 const CHECKPOINTS: Checkpoints = Checkpoints::Every(Duration::from_mins(1));
@@ -63,19 +63,17 @@ impl<const D: usize> Trajectory<D> {
         for observer in observers {
             all.push(&mut **observer);
         }
-        match run.advance(Some(&mut store), &mut all, interrupt)? {
-            Ending::Interrupted => Ok(None),
-            Ending::Stopped(ended) => {
-                store.finish(&run)?;
-                Ok(Some(Self {
-                    case: run.case,
-                    start: run.start,
-                    records: run.records,
-                    ended,
-                    folder: folder.to_owned(),
-                }))
-            }
-        }
+        let Some(ended) = run.advance(Some(&mut store), &mut all, interrupt)? else {
+            return Ok(None);
+        };
+        store.finish(&run)?;
+        Ok(Some(Self {
+            case: run.case,
+            start: run.start,
+            records: run.records,
+            ended,
+            folder: folder.to_owned(),
+        }))
     }
 
     /// The phase field after a step, which must be one that was kept.
@@ -113,14 +111,12 @@ impl<const D: usize> Trajectory<D> {
         self.substeps(step).last()
     }
 
-    /// The measures after a time step; those of the initial phase field for 0.
-    pub fn measures(&self, step: usize) -> Result<&Values, Error> {
-        if step == 0 {
-            return Ok(&self.start);
+    /// The measures after a time step, those of the initial phase field for 0; none if it was not made.
+    pub fn measures(&self, step: usize) -> Option<&Values> {
+        match step {
+            0 => Some(&self.start),
+            _ => self.record(step).map(|record| &record.measures),
         }
-        let steps = self.steps();
-        let record = self.record(step).ok_or(Error::NoSuchStep { step, steps })?;
-        Ok(&record.measures)
     }
 
     /// Wall time of all steps in seconds, interruptions left out.

@@ -134,31 +134,13 @@ fn other(
     Ok((image, Some(orientation)))
 }
 
-/// Grey values and opacities of 16 bits.
+/// Grey values and opacities of 16 bits. Values of 8 bits are multiplied by 257: 255 becomes 65535.
 fn converted(image: DynamicImage) -> Image {
-    let image = match image {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => image.into_rgba16().into(),
-        image => image,
-    };
-    let (colour, bytes) = (image.color(), image.as_bytes());
-    let channels = usize::from(colour.channel_count());
-    let sample = |pixel: usize, channel: usize| {
-        let at = pixel * channels + channel;
-        if usize::from(colour.bytes_per_pixel()) == channels {
-            // From 8 to 16 bits: 255 becomes 65535.
-            257 * u16::from(bytes[at])
-        } else {
-            u16::from_ne_bytes([bytes[2 * at], bytes[2 * at + 1]])
-        }
-    };
-    let pixels = 0..image.width() as usize * image.height() as usize;
-    let grey = pixels.clone().map(|pixel| match channels {
-        1 | 2 => sample(pixel, 0),
-        _ => luma([0, 1, 2].map(|channel| sample(pixel, channel))),
-    });
-    let opacity = pixels.map(|pixel| sample(pixel, channels - 1));
-    let opacity = colour.has_alpha().then(|| opacity.collect());
-    let image = Image::new([image.width(), image.height()], grey.collect(), opacity);
+    let image = image.into_rgba16();
+    let pixels = || image.pixels().map(|pixel| pixel.0);
+    let grey = pixels().map(|[r, g, b, _]| luma([r, g, b])).collect();
+    let opacity = pixels().map(|[.., alpha]| alpha).collect();
+    let image = Image::new([image.width(), image.height()], grey, Some(opacity));
     image.expect("the size is checked and all pixels are filled")
 }
 

@@ -40,7 +40,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let middle = &network.kernel()[half * ratios.width..][..ratios.width];
     let kernel = (0..ratios.width).map(|i| [i as f64 - half as f64, middle[i]]);
     let chart = |title, x, y, points: Vec<[f64; 2]>| {
-        LineChart::new(title, Axis::linear(x), Axis::linear(y)).with_series(Series::new("", points))
+        let curve = Series::new("", points);
+        LineChart::new(title, Axis::linear(x), Axis::linear(y)).with_curves([curve])
     };
     let figure = Figure::new("A learned operator", 2)
         .with_panel(chart("activation", "z", "F(z)", activation.collect()))

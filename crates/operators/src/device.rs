@@ -136,6 +136,14 @@ impl ComputeDevice {
         Self::open(kind)
     }
 
+    /// The device of this name, or else the first one compiled in.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; [`Error::UnknownDevice`] for a name of no device, and if no backend was compiled in at all.
+    pub fn named(name: Option<&str>) -> Result<Self, Error> {
+        name.map_or_else(Self::default_compiled, |name| Self::open(name.parse()?))
+    }
+
     pub(crate) fn new(kind: DeviceKind, device: Device) -> Self {
         let dtype = if kind.is_cpu() {
             DType::F64

@@ -30,9 +30,9 @@ pub enum Error {
         expected: &'static str,
         problem: String,
     },
-    /// What has nothing to show, and its title.
-    #[error("{0} {1:?} is empty: there is nothing to show")]
-    Empty(&'static str, String),
+    /// The surface of this label has no faces.
+    #[error("the surface {0:?} is empty: there is nothing to show")]
+    Empty(String),
     #[error("the surface {label:?} cannot be shown: {source}")]
     Surface {
         label: String,

@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use files::{Sha256, write_atomically};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::Image;
 use crate::text::Text;
 
@@ -35,7 +35,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// An empty page.
+    /// A title and no sections yet.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -50,7 +50,7 @@ impl Page {
         self
     }
 
-    /// Adds a section.
+    /// Adds a section below those before.
     pub fn with(mut self, section: Section) -> Self {
         self.sections.push(section);
         self
@@ -109,7 +109,7 @@ impl Page {
     /// Writes the page, atomically.
     ///
     /// # Errors
-    /// [`Error::Write`].
+    /// [`Error::Write`](crate::Error::Write).
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let html = self.to_html();
         Ok(write_atomically(path, |out| {
@@ -180,7 +180,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// An empty section.
+    /// A heading and no blocks yet.
     pub fn new(title: impl Into<String>) -> Self {
         let title = title.into();
         Self {
@@ -204,7 +204,7 @@ impl Section {
         self
     }
 
-    /// Adds a block.
+    /// As [`Section::with`], in place.
     pub fn push(&mut self, block: impl Render) {
         block.render_to(&mut self.body);
     }
@@ -227,7 +227,7 @@ impl Details {
         }
     }
 
-    /// Adds a block.
+    /// Adds a block as [`Section::with`] does.
     pub fn with(mut self, block: impl Render) -> Self {
         block.render_to(&mut self.body);
         self
@@ -248,7 +248,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A picture with a caption.
+    /// Puts a caption below a picture.
     pub fn new(image: Image, caption: impl Into<String>) -> Self {
         Self {
             image,
@@ -274,16 +274,12 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// A sequence of pictures with a label each, such as the step of a flow.
-    ///
-    /// # Errors
-    /// [`Error::Empty`] without pictures.
-    pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Result<Self> {
-        let caption = caption.into();
-        if frames.is_empty() {
-            return Err(Error::Empty("the sequence of pictures", caption));
+    /// One picture or more with a label each, such as the step of a flow.
+    pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Self {
+        Self {
+            caption: caption.into(),
+            frames,
         }
-        Ok(Self { caption, frames })
     }
 }
 

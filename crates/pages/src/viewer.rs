@@ -5,7 +5,7 @@ use maud::{Markup, PreEscaped, Render, html};
 use render::View;
 use surfaces::TriangleMesh;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::Image;
 use crate::surface::Surface;
 
@@ -24,21 +24,21 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// A viewer of surfaces with a label each. All are seen in one scale and from one direction.
+    /// A viewer of one surface or more with a label each. All are seen in one scale and from one direction.
     ///
     /// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
     /// those of the triangles around a vertex, weighted by area.
     ///
     /// # Errors
-    /// [`Error::Empty`] without surfaces or faces, [`Error::Surface`] for meshes that cannot be
-    /// shown, [`Error::Render`] for angles that are not finite or beyond the poles.
+    /// [`Error::Empty`](crate::Error::Empty) for a surface without faces,
+    /// [`Error::Surface`](crate::Error::Surface) for meshes that cannot be shown,
+    /// [`Error::Render`](crate::Error::Render) for angles that are not finite or beyond the poles.
     pub fn new<'a>(
         caption: impl Into<String>,
         poster: Image,
         view: View,
         surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
     ) -> Result<Self> {
-        let caption = caption.into();
         view.check()?;
         let (mut encoded, mut points) = (Vec::new(), Vec::new());
         for (label, mesh) in surfaces {
@@ -46,16 +46,12 @@ impl Viewer {
             let corners = mesh.faces.as_flattened().iter();
             points.extend(corners.map(|&vertex| mesh.vertices[vertex as usize]));
         }
-        let surfaces = encoded;
-        if surfaces.is_empty() {
-            return Err(Error::Empty("the viewer", caption));
-        }
         let (centre, radius) = ball(&points);
         Ok(Self {
-            caption,
+            caption: caption.into(),
             poster,
             view,
-            surfaces,
+            surfaces: encoded,
             centre,
             radius,
         })

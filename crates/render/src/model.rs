@@ -23,7 +23,7 @@ pub struct Tube {
     pub closed: bool,
     /// Radius, in the units of the surface. Tubes much thinner than a pixel have gaps.
     pub radius: f64,
-    /// Colour.
+    /// The colour of the whole tube.
     pub colour: Rgb,
 }
 

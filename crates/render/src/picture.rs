@@ -1,15 +1,15 @@
 //! Pictures, and animations of them, as PNG files.
 
 use std::path::Path;
-use std::time::Duration;
 
 use files::write_atomically;
-use geometry::require;
 
 use crate::Error;
 
 /// Largest side of a picture, in pixels.
 pub(crate) const LARGEST_SIDE: u32 = 8192;
+/// How long each picture of an animation is shown, in milliseconds.
+const DELAY: u16 = 200;
 
 /// Accepts sizes that can be drawn.
 ///
@@ -67,7 +67,7 @@ impl Picture {
     /// # Errors
     /// [`Error::Encode`].
     pub fn to_png(&self) -> Result<Vec<u8>, Error> {
-        encode_png(std::slice::from_ref(self), None)
+        encode_png(std::slice::from_ref(self), false)
     }
 
     /// Writes a PNG file, atomically (see [`write_atomically`]).
@@ -80,13 +80,12 @@ impl Picture {
     }
 }
 
-/// The bytes of an animated PNG file (APNG): pictures shown one after the other, for ever, each for
-/// `delay`, rounded to milliseconds. Viewers that know no APNG show the first picture.
+/// The bytes of an animated PNG file (APNG): pictures shown one after the other, for ever, five a
+/// second. Viewers that know no APNG show the first picture.
 ///
 /// # Errors
-/// There must be a picture, all must have one size, and the delay must be from one millisecond to a
-/// minute; [`Error::Encode`].
-pub fn animation(frames: &[Picture], delay: Duration) -> Result<Vec<u8>, Error> {
+/// There must be a picture, and all must have one size; [`Error::Encode`].
+pub fn animation(frames: &[Picture]) -> Result<Vec<u8>, Error> {
     let first = frames.first().ok_or(Error::NoFrames)?;
     if let Some(index) = frames.iter().position(|frame| frame.size != first.size) {
         return Err(Error::FrameSize {
@@ -95,15 +94,11 @@ pub fn animation(frames: &[Picture], delay: Duration) -> Result<Vec<u8>, Error> 
             first: first.size,
         });
     }
-    let (name, range) = ("delay in milliseconds", "between 1 and 60000");
-    let milliseconds = 1e3 * delay.as_secs_f64();
-    require(name, milliseconds, range, |v| (1.0..=60e3).contains(&v))?;
-    encode_png(frames, Some(milliseconds.round() as u16))
+    encode_png(frames, true)
 }
 
-/// A PNG file, animated if there is a delay in milliseconds. Opaque pictures are stored without
-/// opacity.
-fn encode_png(frames: &[Picture], delay: Option<u16>) -> Result<Vec<u8>, Error> {
+/// A PNG file. Opaque pictures are stored without opacity.
+fn encode_png(frames: &[Picture], animated: bool) -> Result<Vec<u8>, Error> {
     let mut pixels = frames.iter().flat_map(|frame| &frame.pixels);
     let (colour, channels) = if pixels.all(|pixel| pixel[3] == 255) {
         (png::ColorType::Rgb, 3)
@@ -115,9 +110,9 @@ fn encode_png(frames: &[Picture], delay: Option<u16>) -> Result<Vec<u8>, Error> 
     encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    if let Some(delay) = delay {
+    if animated {
         encoder.set_animated(frames.len() as u32, 0)?;
-        encoder.set_frame_delay(delay, 1000)?;
+        encoder.set_frame_delay(DELAY, 1000)?;
     }
     let mut writer = encoder.write_header()?;
     for frame in frames {

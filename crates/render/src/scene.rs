@@ -87,7 +87,7 @@ impl Scene {
         }
     }
 
-    /// Sets the direction of view.
+    /// Sets the direction of view (from the front right and a little above by default).
     pub fn view(mut self, view: View) -> Self {
         self.view = view;
         self
@@ -100,13 +100,13 @@ impl Scene {
         self
     }
 
-    /// Sets the body colour of the surface.
+    /// Sets the colour of the surface where no other is given ([`Rgb::CLAY`] by default).
     pub fn colour(mut self, colour: Rgb) -> Self {
         self.colour = colour;
         self
     }
 
-    /// Adds tubes.
+    /// Adds tubes, which hide the surface and cast shadows on it.
     pub fn tubes(mut self, tubes: impl IntoIterator<Item = Tube>) -> Self {
         self.tubes.extend(tubes);
         self
@@ -139,7 +139,7 @@ impl Scene {
         Ok(self)
     }
 
-    /// Sets how much is spent.
+    /// Sets how much is spent ([`Quality::Standard`] by default).
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = quality;
         self

@@ -1,7 +1,6 @@
 //! Pictures looked at: outlines, light, tubes, colours, files.
 
 use std::f64::consts::PI;
-use std::time::Duration;
 
 use geometry::measure::BoundingBox;
 use geometry::shapes::{Ball, Cross, Cuboid};
@@ -460,7 +459,7 @@ fn files_hold_the_pictures() {
         picture.clone(),
         Picture::new([40, 30], vec![[7; 4]; 1200]).unwrap(),
     ];
-    let bytes = animation(&pictures, Duration::from_millis(120)).unwrap();
+    let bytes = animation(&pictures).unwrap();
     let (_, control, frames) = decoded(&bytes);
     let control = control.unwrap();
     assert_eq!((control.num_frames, control.num_plays), (2, 0));
@@ -468,12 +467,9 @@ fn files_hold_the_pictures() {
         assert_eq!(frame, picture.pixels().as_flattened());
     }
 
-    let second = Duration::from_secs(1);
-    assert!(matches!(animation(&[], second), Err(Error::NoFrames)));
-    let mixed = animation(&[picture.clone(), opaque], second);
+    assert!(matches!(animation(&[]), Err(Error::NoFrames)));
+    let mixed = animation(&[picture, opaque]);
     assert!(matches!(mixed, Err(Error::FrameSize { index: 1, .. })));
-    let never = animation(&[picture], Duration::ZERO);
-    assert!(matches!(never, Err(Error::Geometry(_))));
     assert!(matches!(
         Picture::new([2, 2], vec![[0; 4]; 3]),
         Err(Error::PixelCount { actual: 3, .. })

@@ -117,7 +117,6 @@ impl<'a> Ruler<'a> {
     }
 }
 
-/// A pair of axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axes<'a> {
     pub window: Window,

@@ -55,11 +55,6 @@ pub enum Error {
         what: String,
         source: serde_json::Error,
     },
-    #[error("cannot write the records as CSV: {source}")]
-    Csv {
-        #[from]
-        source: csv::Error,
-    },
 }
 
 impl Error {

@@ -444,14 +444,19 @@ mod tests {
         LineChart::new(title, axis("time t [s]"), axis("length <L>"))
     }
 
+    /// A panel of shapes around the origin.
+    fn shapes(caption: &str) -> Shapes {
+        Shapes::new(caption, [[-1.12, 1.12]; 2])
+    }
+
     fn heat_map(title: &str, shape: [usize; 2], values: Vec<f64>) -> Heatmap {
         Heatmap::new(title, ["x", "y", ""].map(Axis::linear), shape, values)
     }
 
     /// The straight line from corner to corner of the plot.
     fn diagonal() -> LineChart {
-        unit_square("Diagonal & more")
-            .with_series(Series::new("straight", vec![[0.0, 0.0], [1.0, 1.0]]))
+        let straight = Series::new("straight", vec![[0.0, 0.0], [1.0, 1.0]]);
+        unit_square("Diagonal & more").with_curves([straight])
     }
 
     /// The place of a point of a chart of the unit square, in layout units.
@@ -478,26 +483,9 @@ mod tests {
     }
 
     #[test]
-    fn a_power_law_is_straight_on_logarithmic_axes() {
-        let steps = (0..=60).map(|k| 10.0_f64.powf(-3.0 + f64::from(k) / 20.0));
-        let axes = (
-            Axis::log("h").with_range(1e-3, 1.0),
-            Axis::log("e").with_range(1e-6, 1.0),
-        );
-        let chart =
-            LineChart::new("", axes.0, axes.1).with_series(Series::of("", steps, |h| [h, h * h]));
-        let figure = Figure::from(chart);
-        let picture = picture(&figure);
-        for t in [0.2, 0.5, 0.8] {
-            let (x, y) = place(&figure, [t, t]);
-            assert!(has_near(&picture, BLUE, [x, y], 0.6), "not straight at {t}");
-        }
-    }
-
-    #[test]
     fn points_that_cannot_be_shown_interrupt_the_curve() {
         let points = [0.1, 0.4, f64::NAN, 0.6, 0.9].map(|t| [t, t]);
-        let figure = Figure::from(unit_square("Gap").with_series(Series::new("", points)));
+        let figure = Figure::from(unit_square("Gap").with_curves([Series::new("", points)]));
         let picture = picture(&figure);
         let shown = |t: f64| {
             let (x, y) = place(&figure, [t, t]);
@@ -509,11 +497,10 @@ mod tests {
     #[test]
     fn nothing_to_draw_is_an_error_that_names_the_panel() {
         let bad = Series::new("bad", vec![[0.0, 0.0], [1.0, -1.0], [f64::NAN, 1.0]]);
-        let empty = LineChart::new("c", Axis::linear("t"), Axis::log("W")).with_series(bad);
+        let empty = LineChart::new("c", Axis::linear("t"), Axis::log("W")).with_curves([bad]);
         let panels = [
             Panel::from(empty),
             heat_map("c", [2, 2], vec![f64::NAN; 4]).into(),
-            Shapes::new("c").into(),
             Raster::new("c", [0, 3], vec![]).into(),
         ];
         for panel in panels {
@@ -563,10 +550,10 @@ mod tests {
             "broken",
             vec![[0.0, f64::NAN], [0.5, 0.1], [0.9, f64::INFINITY]],
         );
-        let chart = diagonal().with_series(broken).with_note("A remark.");
+        let chart = diagonal().with_curves([broken]).with_note("A remark.");
         let figure = Figure::new("Two", 2)
             .with_panel(chart)
-            .with_panel(Shapes::new("caption").with_curve(Curve::new(vec![square(1.0)])))
+            .with_panel(shapes("caption").with_curve(Curve::new(vec![square(1.0)])))
             .with_column_labels(["left", "right"])
             .with_row_labels(["only row\nsecond line"])
             .with_note("Another.");
@@ -597,7 +584,7 @@ mod tests {
     fn legends_show_every_curve_below_the_panel_or_the_figure() {
         let two = || {
             let falling = Series::new("falling", vec![[0.0, 1.0], [1.0, 0.0]]);
-            diagonal().with_series(falling.with_colour(1).with_style(LineStyle::Dashed))
+            diagonal().with_curves([falling.with_colour(1).with_style(LineStyle::Dashed)])
         };
         let nameless = |mut chart: LineChart| {
             chart
@@ -631,7 +618,8 @@ mod tests {
     #[test]
     fn markers_are_drawn_without_a_line_between_them() {
         let points = Series::new("", vec![[0.25, 0.5], [0.75, 0.5]]);
-        let figure = Figure::from(unit_square("").with_series(points.with_symbols(Marker::Square)));
+        let points = points.with_symbols(Marker::Square);
+        let figure = Figure::from(unit_square("").with_curves([points]));
         let picture = picture(&figure);
         let (x, y) = place(&figure, [0.25, 0.5]);
         assert!(has_near(&picture, BLUE, [x + 2.5, y + 2.5], 0.3));
@@ -687,14 +675,13 @@ mod tests {
     #[test]
     fn shapes_are_filled_with_holes_and_cut_off_at_the_window() {
         let ring = Curve::new(vec![square(1.0), square(0.5)]).filled(Colour::Palette(1));
-        let seen = Shapes::new("cut").with_window([-2.0, 0.75], [-2.0, 0.75]);
+        let seen = Shapes::new("cut", [[-2.0, 0.75]; 2]);
         let figure = Figure::new("Squares", 2)
-            .with_panel(Shapes::new("ring").with_curve(ring.clone()))
+            .with_panel(shapes("ring").with_curve(ring.clone()))
             .with_panel(seen.with_curve(ring));
         let (picture, layout) = (picture(&figure), figure.layout().unwrap());
         let (left, right) = (layout.cells[0].plot, layout.cells[1].plot);
         assert!((left.width - left.height).abs() <= 1.0);
-        // The window is [-1.12, 1.12]: 6 per cent of the longest side more on each side.
         let unit = left.width / 2.24;
         let at = |x: f64, y: f64| {
             at(
@@ -741,7 +728,7 @@ mod tests {
         let figure = Figure::new("Mixed", 2)
             .with_panel(diagonal())
             .with_panel(heat_map("u", [2, 2], vec![1.0, 2.0, 3.0, 4.0]))
-            .with_panel(Shapes::new("s").with_curve(Curve::new(vec![square(1.0)])))
+            .with_panel(shapes("s").with_curve(Curve::new(vec![square(1.0)])))
             .with_panel(half(30, 20));
         let root = tempfile::tempdir().unwrap();
         let folder = OutputDir::create(root.path()).unwrap();
@@ -840,9 +827,8 @@ mod tests {
             for data in [points, even] {
                 let loops = Curve::new(vec![data.clone()]).filled(0);
                 let chart = LineChart::new("Any", x.clone(), y.clone())
-                    .with_series(Series::new("any", data).with_style(LineStyle::Dashed));
-                let shapes = Shapes::new("Any").with_curve(loops);
-                for figure in [Figure::from(chart), Figure::from(shapes)] {
+                    .with_curves([Series::new("any", data).with_style(LineStyle::Dashed)]);
+                for figure in [Figure::from(chart), Figure::from(shapes("Any").with_curve(loops))] {
                     match figure.with_width(400.0).to_svg() {
                         Ok(svg) => prop_assert!(!svg.contains("NaN") && !svg.contains("inf")),
                         Err(error) => prop_assert!(

@@ -48,7 +48,6 @@ mod axes;
 mod axis;
 mod bitmap;
 mod colour;
-mod data;
 mod encode;
 mod error;
 mod figure;

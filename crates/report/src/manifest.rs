@@ -94,7 +94,7 @@ impl Manifest {
     /// [`Error::File`].
     pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
         self.wall_seconds = self.clock.elapsed().as_secs_f64();
-        folder.write("manifest.json", crate::data::to_json(self)?)
+        folder.write_json("manifest.json", self)
     }
 }
 

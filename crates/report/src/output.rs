@@ -61,27 +61,13 @@ impl OutputDir {
         Ok(path)
     }
 
-    /// Writes records as CSV with a header from their field names (RFC 4180 quoting, line feeds).
-    ///
-    /// Records are flat structs of numbers, text and options (`None` is an empty field). Floats have nine significant digits; NaN
-    /// and infinities are `NaN` and `inf`.
-    ///
-    /// # Errors
-    /// [`Error::Csv`] if a record is not flat, or as [`OutputDir::write`].
-    pub fn write_csv<T: Serialize>(
-        &self,
-        name: &str,
-        records: impl IntoIterator<Item = T>,
-    ) -> Result<PathBuf> {
-        self.write(name, crate::data::to_csv(records)?)
-    }
-
     /// Writes any value as indented JSON with a final newline. JSON knows no NaN and no infinity: they become `null`.
     ///
     /// # Errors
     /// [`Error::Json`] if the value has, for example, a map with keys that are not text, or as [`OutputDir::write`].
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<PathBuf> {
-        self.write(name, crate::data::to_json(value)?)
+        let text = serde_json::to_string_pretty(value).map_err(Error::json("the value"))?;
+        self.write(name, text + "\n")
     }
 }
 
@@ -118,23 +104,6 @@ mod tests {
     }
 
     #[test]
-    fn a_file_in_place_of_the_folder_is_reported_on_one_line() {
-        let root = tempfile::tempdir().unwrap();
-        let blocked = root.path().join("results");
-        fs::write(&blocked, "not a folder").unwrap();
-        for path in [blocked.clone(), blocked.join("deeper")] {
-            let error = OutputDir::create(&path).unwrap_err();
-            assert!(matches!(&error, Error::File(error) if error.path == path));
-            let message = error.to_string();
-            assert!(
-                message.contains("results") && !message.contains('\n'),
-                "{message}"
-            );
-        }
-        assert_eq!(fs::read_to_string(blocked).unwrap(), "not a folder");
-    }
-
-    #[test]
     fn names_with_folders_in_them_are_refused() {
         let root = tempfile::tempdir().unwrap();
         let folder = OutputDir::create(root.path()).unwrap();
@@ -142,20 +111,5 @@ mod tests {
             let error = folder.write(name, "x").unwrap_err();
             assert!(matches!(error, Error::FileName { .. }), "{name:?}");
         }
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn files_are_readable_like_any_other() {
-        use std::os::unix::fs::PermissionsExt;
-        let root = tempfile::tempdir().unwrap();
-        let plain = root.path().join("plain");
-        fs::write(&plain, "x").unwrap();
-        let ours = OutputDir::create(root.path())
-            .unwrap()
-            .write("ours", "x")
-            .unwrap();
-        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
-        assert_eq!(mode(&ours), mode(&plain));
     }
 }

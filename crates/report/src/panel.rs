@@ -16,13 +16,13 @@ use crate::surface::Surface;
 #[derive(Debug, Clone, PartialEq, From)]
 #[non_exhaustive]
 pub enum Panel {
-    /// A line chart.
+    /// Curves over a pair of axes.
     Line(LineChart),
-    /// A heat map.
+    /// An array as colours.
     Heatmap(Heatmap),
     /// Plane curves.
     Shapes(Shapes),
-    /// A picture.
+    /// A picture made elsewhere.
     Raster(Raster),
 }
 

@@ -48,7 +48,7 @@ impl Series {
         self
     }
 
-    /// Sets the line style.
+    /// Sets how the line is stroked (solid by default).
     pub fn with_style(mut self, style: LineStyle) -> Self {
         self.entry.style = style;
         self
@@ -98,13 +98,7 @@ impl LineChart {
         }
     }
 
-    /// Adds a curve.
-    pub fn with_series(mut self, series: Series) -> Self {
-        self.series.push(series);
-        self
-    }
-
-    /// Adds curves.
+    /// Adds curves on top of those before.
     pub fn with_curves(mut self, curves: impl IntoIterator<Item = Series>) -> Self {
         self.series.extend(curves);
         self

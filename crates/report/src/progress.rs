@@ -41,21 +41,3 @@ impl Progress {
         let _ = self.bars.clear();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hidden_bars_count_all_the_same() {
-        let progress = Progress::new(true);
-        let bar = progress.bar("steps", 10);
-        assert!(bar.is_hidden());
-        bar.inc(3);
-        assert_eq!((bar.position(), bar.length()), (3, Some(10)));
-        assert_eq!(bar.message(), "steps");
-        bar.finish();
-        assert!(bar.is_finished());
-        progress.clear();
-    }
-}

@@ -4,7 +4,7 @@ use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
 use crate::panel::Drawable;
 use crate::surface::Surface;
@@ -30,7 +30,7 @@ impl Curve {
         }
     }
 
-    /// Sets the colour of the outline.
+    /// Sets the colour of the outline (near-black by default).
     pub fn with_colour(mut self, colour: impl Into<Colour>) -> Self {
         self.colour = colour.into();
         self
@@ -56,58 +56,36 @@ impl Curve {
     }
 }
 
-/// A panel of plane curves, later ones on top, with a caption above.
+/// A panel of plane curves seen through a window, later ones on top, with a caption above.
 #[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shapes {
     pub(crate) caption: String,
     curves: Vec<Curve>,
-    window: Option<[[f64; 2]; 2]>,
+    window: [[f64; 2]; 2],
 }
 
 impl Shapes {
-    /// A panel showing all of its curves.
-    pub fn new(caption: impl Into<String>) -> Self {
+    /// No curves yet in a window from low to high `x` and from low to high `y`. Panels to be compared need the same.
+    pub fn new(caption: impl Into<String>, window: [[f64; 2]; 2]) -> Self {
         Self {
             caption: caption.into(),
             curves: Vec::new(),
-            window: None,
+            window,
         }
     }
 
-    /// Adds a curve.
+    /// Adds a curve on top of those before.
     pub fn with_curve(mut self, curve: Curve) -> Self {
         self.curves.push(curve);
         self
     }
 
-    /// Fixes the ends of what is shown. Panels to be compared need the same.
-    pub fn with_window(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
-        self.window = Some([x, y]);
-        self
-    }
-
-    /// The window around all finite points, with a margin.
-    fn bounds(&self) -> Result<[[f64; 2]; 2]> {
-        let points = self.curves.iter().flat_map(Curve::finite).flatten();
-        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        let bounds = points
-            .map(|point| point.map(|c| [c, c]))
-            .reduce(|a, b| [join(a[0], b[0]), join(a[1], b[1])]);
-        let bounds = bounds.ok_or_else(|| Error::Empty(self.caption.clone()))?;
-        let [width, height] = bounds.map(|[low, high]| high - low);
-        let longest = width.max(height);
-        let margin = if longest > 0.0 { 0.06 * longest } else { 1.0 };
-        Ok(bounds.map(|[low, high]| [low - margin, high + margin]))
-    }
-
     /// The curves with the window they are seen through.
     pub(crate) fn checked(&self) -> Result<Seen<'_>> {
-        let window = self.window.map_or_else(|| self.bounds(), Ok)?;
-        let window = Window::linear(["x", "y"], window)?;
         Ok(Seen {
             shapes: self,
-            window,
+            window: Window::linear(["x", "y"], self.window)?,
         })
     }
 }

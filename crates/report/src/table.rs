@@ -3,7 +3,6 @@
 use derive_more::From;
 
 use crate::axis::power_of_ten;
-use crate::data::{rounded, shortest};
 use crate::error::{Error, Result};
 use crate::output::OutputDir;
 
@@ -18,7 +17,7 @@ pub enum Format {
     Scientific(usize),
 }
 
-/// One cell.
+/// What a row has in a column.
 #[derive(Debug, Clone, PartialEq, From)]
 pub enum Cell {
     /// Text, whatever the format of the column.
@@ -102,16 +101,15 @@ impl Table {
     }
 
     /// The table as CSV (RFC 4180 quoting, line feeds), numbers with nine significant digits.
-    ///
-    /// # Errors
-    /// [`Error::Csv`] if the table has no columns.
-    pub fn to_csv(&self) -> Result<String> {
+    pub fn to_csv(&self) -> String {
+        let head = self.columns.iter().map(|column| &column.name);
+        let mut rows = self.rows.iter().map(|row| row.iter().map(Cell::raw));
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(self.columns.iter().map(|column| &column.name))?;
-        for row in &self.rows {
-            writer.write_record(row.iter().map(Cell::raw))?;
-        }
-        crate::data::finished(writer)
+        let head = writer.write_record(head);
+        let written = head.and_then(|()| rows.try_for_each(|row| writer.write_record(row)));
+        written.expect("every row has a cell for every column");
+        let bytes = writer.into_inner().expect("memory takes all bytes");
+        String::from_utf8(bytes).expect("all cells are text")
     }
 
     /// The table as Markdown with padded columns, numbers as their columns say.
@@ -145,11 +143,27 @@ impl Table {
     /// Writes `<stem>.csv` and `<stem>.md`.
     ///
     /// # Errors
-    /// As [`Table::to_csv`], or [`Error::File`].
+    /// [`Error::File`].
     pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<()> {
-        folder.write(&format!("{stem}.csv"), self.to_csv()?)?;
+        folder.write(&format!("{stem}.csv"), self.to_csv())?;
         folder.write(&format!("{stem}.md"), self.to_markdown())?;
         Ok(())
+    }
+}
+
+/// The number with nine significant digits: more than any result is good for, and half as long as all digits.
+fn rounded(number: f64) -> f64 {
+    let digits = format!("{number:.8e}");
+    digits.parse().expect("a formatted number is a number")
+}
+
+/// The fewest digits that read back exactly, with an exponent where that is shorter to read.
+fn shortest(number: f64) -> String {
+    let size = number.abs();
+    if size == 0.0 || (1e-7..1e16).contains(&size) {
+        format!("{number}")
+    } else {
+        format!("{number:e}")
     }
 }
 
@@ -177,6 +191,7 @@ fn scientific(number: f64, decimals: usize) -> String {
 mod tests {
     use super::*;
     use crate::Sheet;
+    use proptest::prelude::*;
 
     fn example() -> Table {
         let rows = [
@@ -193,7 +208,7 @@ mod tests {
 
     #[test]
     fn csv_quotes_and_keeps_nine_digits() {
-        let text = example().to_csv().unwrap();
+        let text = example().to_csv();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         assert_eq!(reader.headers().unwrap().iter().next_back(), Some("share"));
         let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
@@ -236,5 +251,14 @@ mod tests {
             error.contains("\"error\"") && error.contains("row 1"),
             "{error}"
         );
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_read_back_exactly_or_to_nine_digits(number in proptest::num::f64::NORMAL) {
+            prop_assert_eq!(shortest(number).parse::<f64>().unwrap().to_bits(), number.to_bits());
+            let rounded = rounded(number);
+            prop_assert!((rounded - number).abs() <= 5e-9 * number.abs());
+        }
     }
 }

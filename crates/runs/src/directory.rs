@@ -1,6 +1,5 @@
 //! A run that is being computed.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -77,7 +76,7 @@ impl RunDirectory {
         };
         run.write_timings(&[])?;
         for (name, bytes) in files {
-            run.write_file(name, |out| out.write_all(bytes))?;
+            run.write_file(name, bytes)?;
         }
         run.commit(state)?;
         Ok(run)
@@ -90,17 +89,12 @@ impl RunDirectory {
 
     /// Writes a file under a new name such as `fields/step-0010.vti`; folders are made. It belongs to
     /// the run from the next commit on, and never changes. After an error the name is free again.
-    pub fn write_file(
-        &mut self,
-        name: &str,
-        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<PathBuf, Error> {
+    pub fn write_file(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         self.check_new(name)?;
-        self.store(name, write)?;
-        let path = self.path.join(name);
-        self.files
-            .insert(name.into(), Kind::Written(Seal::of(&path)?));
-        Ok(path)
+        self.store(name, bytes)?;
+        let seal = Seal::of(&self.path.join(name))?;
+        self.files.insert(name.into(), Kind::Written(seal));
+        Ok(())
     }
 
     /// Takes up a file that other code has written whole at [`path`](RunDirectory::path)`/name`, as
@@ -115,15 +109,11 @@ impl RunDirectory {
     /// Writes or replaces a file that is derived from the state, such as `metrics.csv`: a crash
     /// leaves an old one or the new one. It belongs to the run from the next commit on, but its
     /// content only once the run is finished.
-    pub fn replace_file(
-        &mut self,
-        name: &str,
-        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<(), Error> {
+    pub fn replace_file(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         if !matches!(self.files.get(name), Some(Kind::Derived(_))) {
             self.check_new(name)?;
         }
-        self.store(name, write)?;
+        self.store(name, bytes)?;
         self.files.insert(name.into(), Kind::Derived(None));
         Ok(())
     }
@@ -133,7 +123,8 @@ impl RunDirectory {
         self.remove(|path| path.is_file() && which(&folder::name(&self.path, path)))
     }
 
-    fn remove(&self, which: impl Fn(&Path) -> bool) -> Result<(), Error> {
+    /// Removes those files and folders that `which` names and that are no part of the run.
+    pub(crate) fn remove(&self, which: impl Fn(&Path) -> bool) -> Result<(), Error> {
         let others = folder::others(&self.path, &self.files, &self.steps)?;
         for path in others.into_iter().filter(|path| which(path)) {
             (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
@@ -146,7 +137,7 @@ impl RunDirectory {
     /// leaves the old one or the new one.
     pub fn write_timings(&self, seconds: &[f64]) -> Result<(), Error> {
         let text = timings::encode(seconds)?;
-        self.store(names::TIMINGS, |out| out.write_all(text.as_bytes()))
+        self.store(names::TIMINGS, text.as_bytes())
     }
 
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
@@ -206,14 +197,11 @@ impl RunDirectory {
         Ok(())
     }
 
-    fn store(
-        &self,
-        name: &str,
-        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<(), Error> {
+    fn store(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         let path = self.path.join(name);
         make_folders_on(&*self.storage, path.parent().unwrap_or(&self.path))?;
-        Ok(files::write_atomically_on(&*self.storage, path, write)?)
+        let written = files::write_atomically_on(&*self.storage, path, |out| out.write_all(bytes));
+        Ok(written?)
     }
 
     /// The seal of a file, which then lasts.

@@ -21,7 +21,7 @@
 //!             run.commit(&state)?;
 //!         }
 //!     }
-//!     run.write_file("figures/u.txt", |out| writeln!(out, "{:?}", state.array("u")))?;
+//!     run.write_file("figures/u.txt", format!("{:?}\n", state.array("u")).as_bytes())?;
 //!     run.finish(&state)
 //! }
 //!

@@ -1,6 +1,5 @@
 //! A run as it is found on the disk.
 
-use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -138,8 +137,15 @@ impl StoredRun {
 
     /// Removes old checkpoints and temporary files, which a process that was killed has left, and nothing else.
     pub fn tidy(&self) -> Result<(), Error> {
-        self.give_up_checkpoints()?;
-        self.remove(folder::is_temporary)
+        if self.recovered {
+            self.run.write_timings(&self.timings)?;
+        }
+        // First the commit becomes the last one: after that, no checkpoint lists a file that is about to be removed.
+        let checkpoints = self.run.path.join(names::CHECKPOINTS);
+        (self.run).remove(|path| path.starts_with(&checkpoints))?;
+        let flushed = self.run.storage.sync_folder(&checkpoints);
+        flushed.map_err(files::Error::of("flush", checkpoints))?;
+        self.run.remove(folder::is_temporary)
     }
 
     /// Goes on with the run, also with a finished one. [Leftovers](StoredRun::leftovers) stay until files of the same names are written, but
@@ -172,29 +178,6 @@ impl StoredRun {
             (run.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
         Ok(run)
-    }
-
-    /// Makes the commit the last one: after this, no checkpoint lists a file that is about to be
-    /// removed.
-    fn give_up_checkpoints(&self) -> Result<(), Error> {
-        if self.recovered {
-            self.run.write_timings(&self.timings)?;
-        }
-        let folder = self.run.path.join(names::CHECKPOINTS);
-        self.remove(|path| path.starts_with(&folder))?;
-        let flushed = self.run.storage.sync_folder(&folder);
-        Ok(flushed.map_err(files::Error::of("flush", folder))?)
-    }
-
-    /// Removes leftovers that are still there.
-    fn remove(&self, which: impl Fn(&Path) -> bool) -> Result<(), Error> {
-        for path in self.leftovers.iter().filter(|path| which(path)) {
-            match self.run.storage.remove(path) {
-                Err(e) if e.kind() == NotFound => {}
-                removed => removed.map_err(files::Error::of("remove", path))?,
-            }
-        }
-        Ok(())
     }
 }
 

@@ -221,8 +221,7 @@ fn a_finished_run_can_be_extended() {
     let folder = quick_folder();
     let run = folder.path().join("run");
     let written = |run: &mut RunDirectory, text: &str| {
-        run.replace_file("metrics.csv", |out| out.write_all(text.as_bytes()))
-            .unwrap();
+        run.replace_file("metrics.csv", text.as_bytes()).unwrap();
     };
     let mut first = RunDirectory::create(&run, &FILES, &toy::state_at(0)).unwrap();
     written(&mut first, "first");
@@ -233,7 +232,7 @@ fn a_finished_run_can_be_extended() {
 
     let (mut again, state) = RunDirectory::open(&run).unwrap().resume().unwrap();
     assert_eq!(state, toy::state_at(3));
-    assert!(again.write_file("metrics.csv", |_| Ok(())).is_err());
+    assert!(again.write_file("metrics.csv", b"").is_err());
     again.commit(&toy::state_at(6)).unwrap();
     drop(again);
     fs::write(run.join("metrics.csv"), "half").unwrap();
@@ -350,25 +349,19 @@ fn misuse_is_refused_and_changes_nothing() {
     for name in [
         "", "/a", "a/", "../a", "a/../b", ".hidden", "a b", "a\\b", "ü",
     ] {
-        let error = run.write_file(name, |_| Ok(())).unwrap_err();
+        let error = run.write_file(name, b"").unwrap_err();
         assert!(matches!(error, Error::Invalid(_)), "{name:?}");
-        assert!(run.replace_file(name, |_| Ok(())).is_err());
+        assert!(run.replace_file(name, b"").is_err());
     }
     for name in ["timings.json", "Lock", "checkpoints/a"] {
-        let message = run.write_file(name, |_| Ok(())).unwrap_err().to_string();
+        let message = run.write_file(name, b"").unwrap_err().to_string();
         assert!(message.contains("itself"), "{message}");
     }
     let absent = run.adopt_file("fields/absent").unwrap_err();
     assert!(matches!(absent, Error::Damaged { .. }) && absent.to_string().contains("is missing"));
     assert!(run.write_timings(&[1.0, f64::NAN]).is_err());
-    // A failing producer leaves the name free.
-    let failed = run.write_file("a/b", |_| Err(std::io::Error::other("no")));
-    assert!(matches!(failed, Err(Error::Io(_))));
-    run.write_file("a/b", |out| out.write_all(b"x")).unwrap();
-    assert!(matches!(
-        run.write_file("a/b", |_| Ok(())),
-        Err(Error::Invalid(_))
-    ));
+    run.write_file("a/b", b"x").unwrap();
+    assert!(matches!(run.write_file("a/b", b""), Err(Error::Invalid(_))));
 
     let unusable = |state: &State, run: &mut RunDirectory, reason: &str| {
         let message = run.commit(state).unwrap_err().to_string();

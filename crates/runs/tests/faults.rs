@@ -251,8 +251,7 @@ fn after_a_failed_commit_the_run_goes_on_or_is_opened_again() {
         drop(stored.resume().unwrap());
 
         run.commit(&state_at(6)).unwrap();
-        run.write_file("fields/a", |out| out.write_all(b"a"))
-            .unwrap();
+        run.write_file("fields/a", b"a").unwrap();
         run.commit(&state_at(9)).unwrap();
         drop(run);
         let stored = RunDirectory::open(&path).unwrap();
@@ -266,10 +265,9 @@ fn after_a_failed_commit_the_run_goes_on_or_is_opened_again() {
     }
     // A file alone, and its name is free again.
     let (mut run, ..) = start("file", operations + 3);
-    let failed = run.write_file("fields/a", |out| out.write_all(b"a"));
+    let failed = run.write_file("fields/a", b"a");
     assert!(matches!(failed, Err(Error::Io(_))));
-    run.write_file("fields/a", |out| out.write_all(b"a"))
-        .unwrap();
+    run.write_file("fields/a", b"a").unwrap();
     run.finish(&state_at(3)).unwrap();
 }
 

@@ -67,10 +67,9 @@ fn step(state: &mut State) {
 
 fn write_metrics(run: &mut RunDirectory, state: &State) -> Result<(), Error> {
     let means = state.array("means").unwrap();
-    run.replace_file("metrics.csv", |out| {
-        writeln!(out, "step,mean")?;
-        (means.iter().zip(1..)).try_for_each(|(mean, step)| writeln!(out, "{step},{mean}"))
-    })
+    let rows = (means.iter().zip(1..)).map(|(mean, step)| format!("{step},{mean}\n"));
+    let table = "step,mean\n".to_owned() + &rows.collect::<String>();
+    run.replace_file("metrics.csv", table.as_bytes())
 }
 
 pub fn state_at(step_number: u64) -> State<'static> {
@@ -122,7 +121,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
             let name = format!("fields/step-{:04}.raw", state.step);
             let values = state.arrays[0].1.iter().flat_map(|v| v.to_le_bytes());
             let bytes: Vec<u8> = values.collect();
-            run.write_file(&name, |out| out.write_all(&bytes))?;
+            run.write_file(&name, &bytes)?;
         }
         if state.step == 25 {
             let frames = run.path().join("frames/first");
@@ -144,7 +143,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         }
     }
     if toy.stop >= STEPS {
-        run.write_file("figures/mean.svg", |out| writeln!(out, "{}", state.notes))?;
+        run.write_file("figures/mean.svg", format!("{}\n", state.notes).as_bytes())?;
         write_metrics(&mut run, &state)?;
         run.finish(&state)?;
         toy.committed.set(Some(state.step));

@@ -102,10 +102,11 @@ impl NewtonParams {
 }
 
 /// Why a minimization ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exit {
     /// The stop test holds.
+    #[default]
     Converged,
     /// The gradient vanishes to rounding: `u` is a minimizer already.
     Stationary,
@@ -116,7 +117,7 @@ pub enum Exit {
 }
 
 /// What a minimization did.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NewtonInfo {
     /// Why it ended.
     pub exit: Exit,
@@ -228,14 +229,11 @@ pub(crate) fn minimize_timed<const D: usize>(
         unknowns: previous.shape().num_elements() as f64,
         info: NewtonInfo {
             exit: Exit::IterationLimit,
-            newton: 0,
-            hvp: 0,
             values: 1,
-            gradients: 0,
-            negative_curvature: 0,
             energy_before,
             energy: energy_before,
             estimate: f64::INFINITY,
+            ..NewtonInfo::default()
         },
         times,
     };

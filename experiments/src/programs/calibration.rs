@@ -22,6 +22,9 @@ const TORI: [f64; 3] = [0.40, 0.50, 0.60];
 /// The measurement's time step over the inner one: the interface hardly moves, and its profile relaxes all the same.
 const STEP_RATIO: f64 = 1.0 / 8.0;
 
+/// How the names of networks of the accurate recipe begin.
+const ACCURATE_PREFIX: &str = "accurate_";
+
 /// `eps/h` and `tautilde/h^2` of the finite-element steps of the experiments.
 const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 
@@ -48,7 +51,11 @@ pub fn program(options: &Options) -> Result<()> {
     let mut networks: Vec<(String, Network)> = Vec::new();
     for path in &options.network {
         let network = Network::load(path)?;
-        networks.push((network.ratios().file_name(), network));
+        // The name tells the recipe.
+        let is_accurate = (path.file_name())
+            .is_some_and(|name| name.to_string_lossy().starts_with(ACCURATE_PREFIX));
+        let prefix = if is_accurate { ACCURATE_PREFIX } else { "" };
+        networks.push((format!("{prefix}{}", network.ratios().file_name()), network));
     }
     if networks.is_empty() {
         for (name, network) in [Shipped::Paper.all()?, Shipped::Accurate.all()?].concat() {
@@ -181,7 +188,7 @@ fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>> {
             continue;
         }
         variants.push((n, false, one.clone()));
-        if !one.name.starts_with("accurate") {
+        if !one.name.starts_with(ACCURATE_PREFIX) {
             variants.push((n, true, odd_part(one)));
         }
     }
@@ -244,7 +251,7 @@ fn discs_figure(discs: &[DiscRow]) -> Figure {
             ]);
         }
         let exact = Series::new("exact", [[0.0, 1.0], [0.65, 1.0]]).with_colour(Colour::Black);
-        chart.with_series(exact.with_style(LineStyle::Dashed))
+        chart.with_curves([exact.with_style(LineStyle::Dashed)])
     };
     let same = |a: &DiscRow, b: &DiscRow| a.network == b.network && a.odd_part == b.odd_part;
     Figure::new("Willmore energy of discs, w R/π", 2)
@@ -337,7 +344,7 @@ fn diagnostics(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Diagnostic
 fn diagnostics_figure(all: &[Diagnostics]) -> Figure {
     let chart = |title, x, y, points: fn(&Diagnostics) -> Vec<[f64; 2]>| {
         let curves = all.iter().enumerate().map(|(k, one)| {
-            let accurate = one.network.starts_with("accurate");
+            let accurate = one.network.starts_with(ACCURATE_PREFIX);
             let style = [LineStyle::Solid, LineStyle::Dashed][usize::from(accurate)];
             let curve = Series::new(one.network.clone(), points(one));
             curve.with_colour(k % 8).with_style(style)

@@ -141,7 +141,6 @@ fn denoise<'a>(
     ];
     let (mut curves, mut taubin) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
-        let clock = Instant::now();
         let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
         let mut mesh = noisy.clone();
         let mut all: Vec<Quality> = Vec::new();
@@ -149,10 +148,11 @@ fn denoise<'a>(
             mesh = mesh.smoothed(1, factors[0], factors[1]);
             all.push(clean.quality(&mesh));
         }
-        let seconds = clock.elapsed().as_secs_f64() / ITERATIONS as f64;
         let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(0) + 1;
-        let row = row(method, Some(best), smoothed(best), seconds);
+        let clock = Instant::now();
+        let mesh = smoothed(best);
+        let row = row(method, Some(best), mesh, clock.elapsed().as_secs_f64());
         let least_normals = least(&all, |quality| quality.normals);
         session.metric(&format!("{}.least_normals", row.key()), least_normals)?;
         rows.push(row);

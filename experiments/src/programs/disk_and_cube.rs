@@ -88,7 +88,7 @@ pub fn program(options: &Options) -> Result<()> {
         session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
     };
-    setting.run(session, TITLE, &surfaces, &variants, time, comparisons)
+    setting.run(session, TITLE, &surfaces, time, comparisons)
 }
 
 /// A surface of revolution in controlled steps, or extrapolated, and the sizes of the exact flow.
@@ -139,7 +139,9 @@ fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     for (name, digits) in [("area", 5), ("volume", 5), ("w", 3)] {
         sheet = sheet
             .column(name, Fixed(digits), |row| row.reached.sizes[name])
-            .column("exact", Fixed(digits), |row| row.exact[name]);
+            .column(format!("exact {name}"), Fixed(digits), |row| {
+                row.exact[name]
+            });
     }
     let distance = |row: &Compared| row.reached.distance * n as f64;
     sheet

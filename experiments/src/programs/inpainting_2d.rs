@@ -126,10 +126,9 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let frame = vec![[low, low], [high, low], [high, high], [low, high]];
     let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
     let panels = shown.into_iter().map(|(name, field)| {
-        Shapes::new(name)
+        Shapes::new(name, [[-0.5, 0.5]; 2])
             .with_curve(look::outline(&field).filled(Colour::LightGrey))
             .with_curve(frame.clone().with_width(1.6))
-            .with_window([-0.5, 0.5], [-0.5, 0.5])
     });
     let title = format!("Inpainting: {}", one.shape.title);
     Ok(Figure::new(title, 4).with_panels(panels).with_note(format!(

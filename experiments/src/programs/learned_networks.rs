@@ -49,13 +49,31 @@ pub fn program(options: &Options) -> Result<()> {
     ] {
         session.figure(figure.with_width(width), name)?;
     }
-    let kernels = shown.iter().flat_map(|one| &one.entries);
-    session.output.write_csv("kernels.csv", kernels)?;
-    let activations = shown.iter().flat_map(Shown::activation);
-    session.output.write_csv("activations.csv", activations)?;
+    let kernels: Vec<&Entry> = shown.iter().flat_map(|one| &one.entries).collect();
+    let kernels = Sheet::of(&kernels)
+        .data("network", |at| at.network)
+        .data("offset_x", |at| at.offset_x as f64)
+        .data("offset_y", |at| at.offset_y as f64)
+        .data("distance_over_eps", |at| at.distance_over_eps)
+        .data("kernel", |at| at.kernel)
+        .data("heat_kernel", |at| at.heat_kernel);
+    session.csv(kernels, "kernels")?;
+    let activations: Vec<ActivationRow> = shown.iter().flat_map(Shown::activation).collect();
+    let activations = Sheet::of(&activations)
+        .data("network", |at| at.network)
+        .data("w", |at| at.w)
+        .data("activation", |at| at.activation)
+        .data("splitting", |at| at.splitting);
+    session.csv(activations, "activations")?;
     let both = |one| ["axis", "diagonal"].map(|direction| Shown::transfer(one, direction));
-    let transfers = shown.iter().flat_map(both).flatten();
-    session.output.write_csv("transfer.csv", transfers)?;
+    let transfers: Vec<TransferRow> = shown.iter().flat_map(both).flatten().collect();
+    let transfers = Sheet::of(&transfers)
+        .data("network", |at| at.network)
+        .data("direction", |at| at.direction)
+        .data("eps_k", |at| at.eps_k)
+        .data("transfer", |at| at.transfer)
+        .data("heat", |at| at.heat);
+    session.csv(transfers, "transfer")?;
     let origins: BTreeMap<_, _> = (shown.iter())
         .map(|one| (one.spec.name, (&one.quality, &one.network.provenance)))
         .collect();
@@ -73,7 +91,6 @@ struct Shown {
 }
 
 /// An entry of a kernel.
-#[derive(Serialize)]
 struct Entry {
     network: &'static str,
     offset_x: isize,
@@ -82,7 +99,6 @@ struct Entry {
     kernel: f64,
     heat_kernel: f64,
     /// `K eps^2 / h^2` approximates `eps^2` times the kernel of a convolution integral: comparable across resolutions.
-    #[serde(skip)]
     density: f64,
 }
 
@@ -105,7 +121,6 @@ fn entries(spec: NetworkSpec, network: &Network) -> Vec<Entry> {
     entries.map(entry).collect()
 }
 
-#[derive(Serialize)]
 struct ActivationRow {
     network: &'static str,
     w: f64,
@@ -114,7 +129,6 @@ struct ActivationRow {
 }
 
 /// The transfer function of a kernel along an axis or a diagonal, and `exp(-tautilde k^2)` of the heat kernel.
-#[derive(Serialize)]
 struct TransferRow {
     network: &'static str,
     direction: &'static str,
@@ -184,8 +198,7 @@ fn operators_figure(shown: &[Shown]) -> Figure {
             [at.w, at.splitting]
         });
         LineChart::new("", Axis::linear("w"), Axis::linear("F(w)"))
-            .with_series(learned.with_width(3.6))
-            .with_series(thin(splitting, LineStyle::Dashed))
+            .with_curves([learned.with_width(3.6), thin(splitting, LineStyle::Dashed)])
     };
     Figure::new("Learned operators V[u] = F(K∗u)", shown.len())
         .with_panels(shown.iter().zip(all).map(kernel))
@@ -215,10 +228,11 @@ fn transfer_figure(shown: &[Shown]) -> Figure {
             at.heat
         });
         let value = Axis::linear("transfer function").with_range(-0.05, 1.05);
-        LineChart::new(one.title(), axis(), value)
-            .with_series(along_axis.with_width(3.6))
-            .with_series(along_diagonal)
-            .with_series(thin(heat, LineStyle::Dotted))
+        LineChart::new(one.title(), axis(), value).with_curves([
+            along_axis.with_width(3.6),
+            along_diagonal,
+            thin(heat, LineStyle::Dotted),
+        ])
     };
     let difference = |one: &Shown| {
         LineChart::new("", axis(), Axis::linear("difference to the heat kernel"))
@@ -244,8 +258,10 @@ fn radial_figure(shown: &[Shown]) -> Figure {
         });
         let distance = Axis::linear("distance / ε").with_range(0.0, 4.0);
         LineChart::new(one.title(), distance, Axis::linear("K ε²/h²"))
-            .with_series(entries.with_symbols(Marker::Circle))
-            .with_series(thin(heat, LineStyle::Dashed))
+            .with_curves([
+                entries.with_symbols(Marker::Circle),
+                thin(heat, LineStyle::Dashed),
+            ])
             .with_note(format!(
                 "Spread at equal distance: {:.1e} of the largest entry.",
                 one.quality.radial_asymmetry

@@ -88,7 +88,7 @@ pub fn program(options: &Options) -> Result<()> {
     let networks = timing::networks(&options.networks, planes)?;
     let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
-    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about()? });
+    let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
     let mut session = Session::open("performance", run, parameters)?;
     let mut all = Vec::new();
     for &n in planes {
@@ -258,12 +258,12 @@ fn figure(all: &[Measurement]) -> Figure {
         let seconds = rows().map(|m| [m.unknowns(), m.steps["seconds_per_step"]]);
         let seconds = curve(&name, seconds.collect()).with_colour(Colour::Black);
         slopes.extend(timing::exponent(&seconds.points).map(|p| format!("{p:.2} in {name}")));
-        cost = cost.with_series(seconds);
+        cost = cost.with_curves([seconds]);
         for (k, (part, _)) in all[0].parts.iter().enumerate() {
             let seconds = rows().map(|m| [m.unknowns(), m.parts[k].1]);
             let seconds = seconds.filter(|[_, seconds]| *seconds > 0.0).collect();
             let curve = curve(&format!("{part}, {name}"), seconds);
-            shares = shares.with_series(curve.with_colour(k));
+            shares = shares.with_curves([curve.with_colour(k)]);
         }
         entries.push(LegendEntry::line(name, Colour::Black, style));
     }

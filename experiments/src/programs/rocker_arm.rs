@@ -57,9 +57,12 @@ fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
         let as_field = || Ok(torus.phase_field(last.grid(), case.scales.eps)?);
         let w = energy_by_elements(case, as_field)?;
         let (l2, outer_radius) = (torus.l2, torus.outer_radius);
+        let papers = match one.snapshots.last().and_then(|last| last.paper) {
+            Some(_) => format!(" (paper: distance {PAPERS_L2:.4}, w = {PAPERS_CLIFFORD})"),
+            None => String::new(),
+        };
         session.remark(format!(
-            "Nearest Clifford torus, {}: L2 distance {l2:.4} (paper {PAPERS_L2:.4}), outer radius {outer_radius:.3}{} (paper \
-             {PAPERS_CLIFFORD})",
+            "Nearest Clifford torus, {}: L2 distance {l2:.4}, outer radius {outer_radius:.3}{}{papers}",
             one.label(),
             w.map_or(String::new(), |w| format!(", w = {w:.2}"))
         ));

@@ -208,7 +208,7 @@ fn energies(all: &[Measurement]) -> LineChart {
         .with_colour(Colour::Black)
         .with_style(LineStyle::Dashed);
     LineChart::new("Willmore energy", Axis::linear("radius"), Axis::linear("w"))
-        .with_series(elements.with_colour(1).with_marker(Marker::Square))
+        .with_curves([elements.with_colour(1).with_marker(Marker::Square)])
         .with_curves(relaxed)
-        .with_series(exact)
+        .with_curves([exact])
 }

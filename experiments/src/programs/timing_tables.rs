@@ -116,9 +116,12 @@ pub fn program(options: &Options) -> Result<()> {
         Ok((format!("n{n}"), found.network.fingerprint().into()))
     };
     let checksums = cells.iter().map(checksum);
+    let n = if quick { 32 } else { 64 };
+    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
+    let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
     let parameters = json!({
         "networks": checksums.collect::<Result<serde_json::Map<_, _>>>()?,
-        "cells": cells, "budget": budget, "steps": STEPS, "mesh": options.mesh.about(&ARMADILLO)?,
+        "cells": cells, "budget": budget, "steps": STEPS, "mesh": mesh.about,
     });
     let mut session = Session::open("timing_tables", run, parameters)?;
     let mut timings = Vec::new();
@@ -126,12 +129,9 @@ pub fn program(options: &Options) -> Result<()> {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
     // One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2.
-    let n = if quick { 32 } else { 64 };
     let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
     let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
-    let grid = surfaces::centred_box(n, options.mesh.box_side(&ARMADILLO))?;
-    let (surface, steps) = session.phase("armadillo", |stage| {
-        let mesh = options.mesh.load_or_built_in(&ARMADILLO, &grid)?;
+    let steps = session.phase("armadillo", |stage| {
         let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
         let mut steps = Vec::new();
         for (method, papers_seconds) in [(Hybrid, 807.0), (FeImplicit, 14589.0)] {
@@ -141,7 +141,7 @@ pub fn program(options: &Options) -> Result<()> {
             let run = stage.run(Case::willmore(&mesh.title, initial, operator, scales, time))?;
             steps.push((method, timing::numbers(&run), papers_seconds));
         }
-        Ok((mesh.title, steps))
+        Ok(steps)
     })?;
 
     let times = |t: &Timing, k: usize| t.over_hybrid(&timings).map(|times| times[k]);
@@ -158,7 +158,7 @@ pub fn program(options: &Options) -> Result<()> {
     session.remark(run.title("One Willmore step of a surface"));
     let steps = Sheet::of(&steps)
         .keyed(|(method, ..), name| format!("timing.armadillo.{method}.{name}"))
-        .text("surface", |_| &surface)
+        .text("surface", |_| &mesh.title)
         .text("method", |(method, ..)| method.label())
         .column("n", Shortest, |_| n)
         .measure("seconds", ("one step [s]", Fixed(2)), |s| s.1["seconds"])

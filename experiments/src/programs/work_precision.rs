@@ -288,7 +288,7 @@ fn sheet<'a>(rows: &'a [Compared<'a>]) -> Sheet<'a, Compared<'a>> {
             row.reached.distance
         })
         .measure("estimated_error", (estimate, Scientific(1)), |row| {
-            Some(row.reached.estimated).filter(|error| *error > 0.0)
+            row.reached.estimated
         })
         .measure("steps", ("steps", Shortest), |row| row.reached.steps)
         .measure("hvp_total", ("HVP", Fixed(0)), |row| row.reached.hvp)
