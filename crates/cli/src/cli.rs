@@ -319,7 +319,7 @@ pub struct FlowOptions {
     pub tolerance: Option<Amount>,
 
     /// Hold the volume (the area of a plane shape): keep, a VALUE in the units of the input, or PERCENT of that at the beginning, as 90%;
-    /// of a segmentation it is that of the voxels [default: keep for `fair` of a segmentation]
+    /// of a segmentation it is that of the voxels without specks [default: keep for `fair` of a segmentation]
     #[arg(long, value_name = "TARGET")]
     pub volume: Option<SizeTarget>,
 

@@ -30,7 +30,7 @@ pub fn over_chunks<T: Send>(
 
 /// `f(0), f(1), ...`, where one value alone is worth a call. At least `share` of them make a task.
 pub fn map<T: Send>(len: usize, share: usize, f: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
-    collect(len, share, &|indices, made| made.extend(indices.map(f)))
+    collect(len, share, &|indices| indices.map(f).collect())
 }
 
 /// Those of `f(0), f(1), ...` that there are, in this order.
@@ -39,16 +39,14 @@ pub fn filter_map<T: Send>(
     share: usize,
     f: &(dyn Fn(usize) -> Option<T> + Sync),
 ) -> Vec<T> {
-    collect(len, share, &|indices, made| {
-        made.extend(indices.filter_map(f));
-    })
+    collect(len, share, &|indices| indices.filter_map(f).collect())
 }
 
-/// What `work` appends for each range of indices below `len`, in their order.
+/// What `work` makes of ranges of indices below `len`, in their order.
 fn collect<T: Send>(
     len: usize,
     share: usize,
-    work: &(dyn Fn(Range<usize>, &mut Vec<T>) + Sync),
+    work: &(dyn Fn(Range<usize>) -> Vec<T> + Sync),
 ) -> Vec<T> {
     let part = share.max(len.div_ceil(PARTS_PER_THREAD * rayon::current_num_threads()));
     let parts: Vec<Mutex<Vec<T>>> = (0..len.div_ceil(part.max(1)))
@@ -56,11 +54,17 @@ fn collect<T: Send>(
         .collect();
     over(parts.len(), 1, &|number| {
         let first = number * part;
-        work(first..len.min(first + part), &mut lock(&parts[number]));
+        let made = work(first..len.min(first + part));
+        *lock(&parts[number]) = made;
     });
-    let mut all = Vec::new();
-    for made in parts {
-        all.append(&mut made.into_inner().unwrap_or_else(PoisonError::into_inner));
+    let made = |part: Mutex<Vec<T>>| part.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut parts: Vec<Vec<T>> = parts.into_iter().map(made).collect();
+    if parts.len() == 1 {
+        return parts.swap_remove(0);
+    }
+    let mut all = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    for mut made in parts {
+        all.append(&mut made);
     }
     all
 }

@@ -17,7 +17,7 @@ use crate::{Error, Grid, PhaseField, vector};
 mod layer;
 mod sizes;
 
-use layer::Layer;
+use layer::{Around, Layer};
 pub use sizes::{SizeHessian, Sizes};
 
 /// Nodes farther than this from the zero set, in spacings, do not count in integrals of the curvature: the differences of differences
@@ -63,11 +63,12 @@ impl ZeroSet {
 
     fn on<const D: usize>(layer: &Layer<D>) -> Self {
         let (spacing, cell) = (layer.grid.spacing(), layer.grid.cell_volume());
-        let normals = layer.normals();
+        // Here and not in the loop, see `Layer::around`.
+        let tables = (layer.around(), layer.gradients(), layer.normals());
         let samples = layer.map(|place| {
             let distance = layer.near(place)?;
             (distance.abs() < CURVATURE_REACH * spacing)
-                .then(|| sample(layer, normals, place, distance))
+                .then(|| sample(layer, tables, place, distance))
         });
         let mut sums = Sums::default();
         for sample in samples.iter().flatten() {
@@ -110,11 +111,11 @@ struct Sample {
 
 fn sample<const D: usize>(
     layer: &Layer<D>,
-    normals: &[[f64; D]],
+    (around, gradients, normals): (&[Around<D>], &[[f64; D]], &[[f64; D]]),
     place: usize,
     distance: f64,
 ) -> Sample {
-    let bends = layer.jacobian_at(place, normals);
+    let bends = layer.jacobian(&around[place], normals);
     let curvature: f64 = (0..D).map(|axis| bends[axis][axis]).sum();
     // Two principal curvatures from their sum and the sum of their squares; in 2D the other is zero.
     let squares: f64 = bends.iter().map(|row| vector::dot(*row, *row)).sum();
@@ -123,7 +124,7 @@ fn sample<const D: usize>(
         2 => curvature.abs(),
         _ => 0.5 * (curvature.abs() + gap),
     };
-    let gradient = vector::norm(layer.gradients()[place]);
+    let gradient = vector::norm(gradients[place]);
     Sample {
         distance,
         element: layer.kernel.value(distance) * gradient,

@@ -7,6 +7,7 @@ use geometry::zero_set::{Sizes, ball_perimeter, reduced_volume};
 use geometry::{
     Error, Field, Grid, SignedDistance, SignedDistanceExt, ZeroSet, exact, phase_field,
 };
+use rayon::ThreadPoolBuilder;
 
 /// The ellipsoid of revolution about the third axis: the distance is that of the ellipse which is its profile.
 struct Spheroid(Ellipse);
@@ -22,6 +23,17 @@ fn measured<const D: usize>(side: f64, shape: &impl SignedDistance<D>) -> ZeroSe
     let grid = Grid::<D>::per_unit(64, side).unwrap();
     let eps = 2.0 * grid.spacing();
     ZeroSet::of(&phase_field(grid, shape, eps).unwrap(), eps).unwrap()
+}
+
+/// More threads than cores, so that some take up the work of others while they wait. If they wait for each other, this test does not end.
+#[test]
+fn many_threads_measure_the_same() {
+    let pool = ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+    let ball = Ball::new([0.0; 3], 0.3).unwrap();
+    let alone = measured(1.0, &ball);
+    for _ in 0..10 {
+        assert_eq!(pool.install(|| measured(1.0, &ball)), alone);
+    }
 }
 
 /// Perimeter, volume and integrals of k and k^2/2 of the spheroid by the midpoint rule on its profile (spectral in the angle).

@@ -277,13 +277,14 @@ pub fn superscript(exponent: i32) -> String {
     digits.chars().map(raised).collect()
 }
 
-/// A real minus sign, and none on zero.
-fn signed(number: &str) -> String {
-    match number.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
-        Some(rest) => format!("−{rest}"),
-        None => number.to_owned(),
+/// The number with a real minus sign, and zero without a sign: `−0.5` for `-0.5`, `0.0` for `-0.0` and `+0.0`.
+pub fn signed(number: &str) -> String {
+    let digits = number.trim_start_matches(['+', '-']);
+    if digits.chars().all(|c| matches!(c, '0' | '.')) {
+        return digits.to_owned();
     }
+    let below_zero = number.strip_prefix('-');
+    below_zero.map_or_else(|| number.to_owned(), |digits| format!("−{digits}"))
 }
 
 #[cfg(test)]
@@ -348,6 +349,8 @@ mod tests {
             ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
         );
         assert_eq!(labels(&linear_ticks(-1.0, 1.0, 2)), ["−1", "0", "1"]);
+        let numbers = ["-1.5", "+1.5", "-0.00", "+0.0", "0"];
+        assert_eq!(numbers.map(signed), ["−1.5", "+1.5", "0.00", "0.0", "0"]);
         assert_eq!(labels(&linear_ticks(-1e-9, 4e-8, 1)), ["0"]);
         let small = linear_ticks(0.0, 4e-5, 4);
         assert_eq!(labels(&small), ["0", "1", "2", "3", "4"]);

@@ -69,7 +69,7 @@ mod surface;
 mod svg;
 mod table;
 
-pub use axis::{Axis, superscript};
+pub use axis::{Axis, signed, superscript};
 pub use colour::{Colour, OKABE_ITO, viridis};
 pub use error::{Error, Result};
 pub use figure::Figure;

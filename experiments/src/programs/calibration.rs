@@ -63,7 +63,7 @@ pub fn program(options: &Options) -> Result<()> {
         }
     }
     let names: BTreeSet<&str> = networks.iter().map(|(name, _)| &**name).collect();
-    let message = "two networks have the same ratios: give them in runs of their own";
+    let message = "two networks have the same recipe and ratios: give them in runs of their own";
     require(names.len() == networks.len(), message)?;
     networks.truncate(run.either(1, usize::MAX));
     let checksums = (networks.iter()).map(|(name, network)| (name, network.fingerprint()));

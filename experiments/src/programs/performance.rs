@@ -96,7 +96,6 @@ pub fn program(options: &Options) -> Result<()> {
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
         all.push(Measurement::of("cross", &case, &mut session, turns)?);
     }
-    // Before larger ones, as what these leave behind would count as their memory.
     let stored = options.storage.measure(&options.networks, &mut session)?;
     for (name, n, steps) in solids {
         let operator = learned(surfaces::needed_network())?;

@@ -205,7 +205,8 @@ impl Row<'_> {
 
     fn picture(&self) -> Result<Raster> {
         let frame = (self.of.up, self.of.marched.bounding_box());
-        let caption = format!("{}\nvolume {:+.2} %", self.treatment.1, self.change());
+        let change = report::signed(&format!("{:+.2}", self.change()));
+        let caption = format!("{}\nvolume {change} %", self.treatment.1);
         mesh_raster(&self.surface, frame, caption)
     }
 }

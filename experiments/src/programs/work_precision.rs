@@ -207,10 +207,9 @@ fn time_errors<const D: usize>(
             let eps = run.case.scales.eps;
             let error = truth::distance_of_levels(&field?, &precise?, eps);
             session.metric(&format!("{name}.time_error.step{mark}"), error)?;
-            let estimated = engine::estimated_time_error(truth::until(run, time)).unwrap_or(0.0);
-            if estimated > 0.0 && error > SAME {
-                ratios.push(estimated / error);
-            }
+            let estimated = engine::estimated_time_error(truth::until(run, time));
+            let known = estimated.filter(|estimate| *estimate > 0.0 && error > SAME);
+            ratios.extend(known.map(|estimate| estimate / error));
         }
     }
     Ok(ratios)

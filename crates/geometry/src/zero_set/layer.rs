@@ -91,6 +91,9 @@ fn gaussian(d: f64, width: f64) -> f64 {
     0.5 * FRAC_2_SQRT_PI / width * (-t * t).exp()
 }
 
+/// For each axis the places of the neighbours of a node, in the order of the weights; beyond the last where there is none.
+pub(super) type Around<const D: usize> = [[u32; NEIGHBOURS]; D];
+
 /// The nodes near the zero set, and those that the differences there reach, as far as they are stored.
 pub(super) struct Layer<const D: usize> {
     stored: Nodes<D>,
@@ -105,8 +108,7 @@ pub(super) struct Layer<const D: usize> {
     pub(super) nodes: Vec<u32>,
     /// Where a stored node is in `nodes`.
     places: Vec<u32>,
-    /// For each axis the places of the neighbours of a place, in the order of [`Self::weights`]; beyond the last where there is none.
-    around: OnceLock<Vec<[[u32; NEIGHBOURS]; D]>>,
+    around: OnceLock<Vec<Around<D>>>,
     gradients: OnceLock<Vec<[f64; D]>>,
     normals: OnceLock<Vec<[f64; D]>>,
 }
@@ -188,8 +190,9 @@ impl<const D: usize> Layer<D> {
         self.is_near(node).then(|| self.distance[node])
     }
 
-    /// For each axis the places of the neighbours of the nodes of the layer.
-    pub(super) fn around(&self) -> &[[[u32; NEIGHBOURS]; D]] {
+    /// The neighbours of the nodes of the layer. Not to be called first in a loop on all cores: all of them make
+    /// the table, and one that waits for another inside the loop may take up work that waits for the table.
+    pub(super) fn around(&self) -> &[Around<D>] {
         let place_of =
             |neighbour: Result<usize, bool>| neighbour.map_or(NOWHERE, |node| self.places[node]);
         self.around
@@ -226,10 +229,11 @@ impl<const D: usize> Layer<D> {
         [near, -near, middle, -middle, far, -far]
     }
 
-    /// The derivatives of a vector field on the layer, zero elsewhere; the first index is that of the derivative.
-    pub(super) fn jacobian_at(&self, place: usize, field: &[[f64; D]]) -> [[f64; D]; D] {
+    /// The derivatives of a vector field on the layer, zero elsewhere, at a place with these [neighbours](Self::around); the first index is
+    /// that of the derivative.
+    pub(super) fn jacobian(&self, around: &Around<D>, field: &[[f64; D]]) -> [[f64; D]; D] {
         let weights = self.weights();
-        self.around()[place].map(|around| {
+        around.map(|around| {
             let mut sum = [0.0; D];
             for (weight, other) in weights.iter().zip(around) {
                 if let Some(value) = field.get(other as usize) {
@@ -240,10 +244,10 @@ impl<const D: usize> Layer<D> {
         })
     }
 
-    /// The divergence of a vector field on the layer, zero elsewhere: minus the adjoint of the gradient.
-    pub(super) fn divergence_at(&self, place: usize, field: &[[f64; D]]) -> f64 {
+    /// The divergence of such a field: minus the adjoint of the gradient.
+    pub(super) fn divergence(&self, around: &Around<D>, field: &[[f64; D]]) -> f64 {
         let (weights, mut sum) = (self.weights(), 0.0);
-        for (axis, around) in self.around()[place].iter().enumerate() {
+        for (axis, around) in around.iter().enumerate() {
             for (weight, other) in weights.iter().zip(around) {
                 if let Some(value) = field.get(*other as usize) {
                     sum += weight * value[axis];

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::layer::{Layer, NEIGHBOURS, SHARE};
+use super::layer::{Around, Layer, NEIGHBOURS, SHARE};
 use crate::{Error, PhaseField, parallel, vector};
 
 /// Perimeter and volume of the zero set as functions of the nodal values, at one phase field: values, gradients, and products with
@@ -64,9 +64,9 @@ impl<const D: usize> Sizes<D> {
 
     /// The mean curvature `k` at the nodes with a weight, zero elsewhere.
     pub fn mean_curvature(&self) -> Vec<f64> {
-        let normals = self.layer.normals();
+        let (around, normals) = (self.layer.around(), self.layer.normals());
         self.spread(self.layer.map(|place| match self.layer.near(place) {
-            Some(_) => self.layer.divergence_at(place, normals),
+            Some(_) => self.layer.divergence(&around[place], normals),
             None => 0.0,
         }))
     }
@@ -85,7 +85,7 @@ impl<const D: usize> Sizes<D> {
     fn perimeter_by_distance(&self) -> &[f64] {
         self.by_distance[0].get_or_init(|| {
             let (layer, kernel) = (&self.layer, self.layer.kernel);
-            let (normals, gradients) = (layer.normals(), layer.gradients());
+            let (around, gradients, normals) = (layer.around(), layer.gradients(), layer.normals());
             let fluxes = layer.map(|place| match layer.near(place) {
                 Some(d) => vector::scale(normals[place], kernel.value(d)),
                 None => [0.0; D],
@@ -93,7 +93,7 @@ impl<const D: usize> Sizes<D> {
             layer.map(|place| {
                 let own = (layer.near(place))
                     .map_or(0.0, |d| kernel.slope(d) * vector::norm(gradients[place]));
-                layer.grid.cell_volume() * (own - layer.divergence_at(place, &fluxes))
+                layer.grid.cell_volume() * (own - layer.divergence(&around[place], &fluxes))
             })
         })
     }
@@ -128,14 +128,14 @@ impl<const D: usize> Sizes<D> {
 
     /// Second derivatives at one node with a weight: by the distance variable, by that and the gradient along the normal, and by the
     /// tangential gradient.
-    fn second_at(&self, place: usize, [perimeter, volume]: [f64; 2]) -> [f64; 3] {
-        let (layer, kernel, cell) = (
-            &self.layer,
-            self.layer.kernel,
-            self.layer.grid.cell_volume(),
-        );
-        let d = layer.near(place).unwrap_or(f64::INFINITY);
-        let gradient = vector::norm(layer.gradients()[place]).max(f64::MIN_POSITIVE);
+    fn second_at(
+        &self,
+        (place, gradient): (usize, [f64; D]),
+        [perimeter, volume]: [f64; 2],
+    ) -> [f64; 3] {
+        let (kernel, cell) = (self.layer.kernel, self.layer.grid.cell_volume());
+        let d = self.layer.near(place).unwrap_or(f64::INFINITY);
+        let gradient = vector::norm(gradient).max(f64::MIN_POSITIVE);
         let own = perimeter * kernel.curvature(d) * gradient - volume * kernel.slope(d);
         [
             own,
@@ -177,7 +177,7 @@ fn counts<const D: usize>(layer: &Layer<D>, place: usize) -> Option<f64> {
 struct Site<const D: usize> {
     node: u32,
     /// Its neighbours among the sites; beyond the last where there is none.
-    around: [[u32; NEIGHBOURS]; D],
+    around: Around<D>,
     /// The derivative of the distance variable by the value.
     slope: f64,
     /// The first derivative by the distance variable, times the second of that by the value.
@@ -204,7 +204,8 @@ impl<const D: usize> SizeHessian<D> {
                 places.push(place);
             }
         }
-        let (first, normals) = (sizes.by_distance(weights), layer.normals());
+        let (first, gradients) = (sizes.by_distance(weights), layer.gradients());
+        let normals = layer.normals();
         let site_of = |place: u32| sites_of.get(place as usize).copied().unwrap_or(u32::MAX);
         let site = |index: usize| {
             let place = places[index];
@@ -216,7 +217,7 @@ impl<const D: usize> SizeHessian<D> {
                 bent: first[place] * curvature,
                 normal: normals[place],
                 second: if active[place] {
-                    sizes.second_at(place, weights)
+                    sizes.second_at((place, gradients[place]), weights)
                 } else {
                     [0.0; 3]
                 },
