@@ -24,7 +24,7 @@ const DEEPEST: u32 = 48;
 /// beyond it, and every `tau / 2^k` not smaller than the first substep is the end of one. After a substep that took few Newton steps
 /// the next one is twice as long, after one that took many half as long, as far as that rule allows; after a failure that takes
 /// a few substeps longer.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Substeps {
     tau: f64,
     /// The next substep has size `tau / 2^depth`,
@@ -151,6 +151,28 @@ mod tests {
         assert!(made.iter().all(|size| *size >= 1.0 / 64.0));
         assert!(made.windows(2).all(|pair| pair[1] <= 2.0 * pair[0]));
         assert!(made.contains(&(1.0 / 64.0)) && made.contains(&0.0625));
+    }
+
+    #[test]
+    fn the_records_restore_the_substeps() {
+        let start = Substeps {
+            deepest: 13,
+            ..Substeps::new(1.0, 0.01, 0.01).unwrap()
+        };
+        let newton = |k: usize| [3, 9, 25, 2, 2][k % 5];
+        let (mut substeps, mut records) = (start, Vec::new());
+        while !substeps.is_complete() {
+            let mut restored = start;
+            for record in &records {
+                restored.made(record);
+            }
+            assert_eq!(restored, substeps);
+            // Some fail once.
+            let part = if records.len() % 7 == 5 { 0.5 } else { 1.0 };
+            records.push(record(part * substeps.size(), newton(records.len())));
+            substeps.made(&records[records.len() - 1]);
+        }
+        assert!(records.len() > 5);
     }
 
     #[test]

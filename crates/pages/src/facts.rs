@@ -170,6 +170,7 @@ mod tests {
     use std::fmt::Write;
 
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn long_series_take_one_line() {
@@ -231,6 +232,22 @@ mod tests {
         ];
         for (value, text) in cases {
             assert_eq!(five_digits(value), text);
+        }
+    }
+
+    fn name() -> impl Strategy<Value = String> {
+        let characters = prop::sample::select(vec!['a', '.', '0', '1', '2']);
+        prop::collection::vec(characters, 0..7).prop_map(String::from_iter)
+    }
+
+    proptest! {
+        #[test]
+        fn the_natural_order_is_an_order(a in name(), b in name(), c in name()) {
+            prop_assert_eq!(natural(&a, &b), natural(&b, &a).reverse());
+            prop_assert_eq!(natural(&a, &b) == Ordering::Equal, a == b);
+            if natural(&a, &b).is_le() && natural(&b, &c).is_le() {
+                prop_assert!(natural(&a, &c).is_le());
+            }
         }
     }
 }

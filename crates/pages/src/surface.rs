@@ -219,12 +219,23 @@ mod tests {
         };
         let error = Surface::new("none", &mesh(&[[0.0; 3]], &[])).unwrap_err();
         assert!(matches!(&error, Error::Empty(label) if label == "none"));
-        let vertices = [[0.0; 3], [0.0, 2.0 * LARGEST, 0.0]];
-        let error = Surface::new("far", &mesh(&vertices, &[[0, 1, 0]])).unwrap_err();
+        for value in [f64::NAN, f64::INFINITY, 1e300] {
+            let vertices = [[0.0; 3], [0.0, value, 0.0]];
+            let error = Surface::new("far", &mesh(&vertices, &[[0, 1, 0]])).unwrap_err();
+            assert!(
+                error.to_string().contains("\"far\"") && error.to_string().contains("vertex 1"),
+                "{error}"
+            );
+        }
+        let mut bare = mesh(&[[0.0; 3]; 2], &[[0, 1, 0]]);
+        bare.normals = Some(vec![[0.0, 0.0, 1.0]]);
+        let error = Surface::new("bare", &bare).unwrap_err();
         assert!(
-            error.to_string().contains("\"far\"") && error.to_string().contains("vertex 1"),
+            error.to_string().contains("1 normals for 2 vertices"),
             "{error}"
         );
+        let error = Surface::new("x", &mesh(&[[0.0; 3]; 2], &[[0, 1, 0], [0, 2, 1]])).unwrap_err();
+        assert!(matches!(error, Error::Surface { .. }), "{error}");
     }
 
     proptest! {

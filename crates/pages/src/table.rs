@@ -17,41 +17,50 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table of rows that have a cell for every name in `head`.
+    /// A table from its parts.
     ///
     /// # Errors
-    /// [`Error::Table`] without columns.
+    /// [`Error::Table`] without columns, and for rows of other lengths.
     pub fn new(
         caption: impl Into<String>,
         head: impl IntoIterator<Item = impl Into<String>>,
         rows: impl IntoIterator<Item = impl IntoIterator<Item = impl Into<String>>>,
     ) -> Result<Self> {
-        let (caption, head) = (caption.into(), words(head));
-        if head.is_empty() {
-            return Err(Error::Table {
-                name: caption,
-                problem: "it has no columns".to_owned(),
-            });
-        }
-        Ok(Self {
-            caption,
-            head,
-            rows: rows.into_iter().map(words).collect(),
-            marked: false,
-        })
+        let (name, head) = (caption.into(), words(head));
+        let rows: Vec<Vec<String>> = rows.into_iter().map(words).collect();
+        let other = rows.iter().position(|row| row.len() != head.len());
+        let problem = match other {
+            _ if head.is_empty() => "it has no columns".to_owned(),
+            Some(row) => {
+                let (found, expected) = (rows[row].len(), head.len());
+                format!("row {row} has {found} cells where there are {expected} columns")
+            }
+            None => {
+                return Ok(Self {
+                    caption: name,
+                    head,
+                    rows,
+                    marked: false,
+                });
+            }
+        };
+        Err(Error::Table { name, problem })
     }
 
     /// A table from CSV with a head.
     ///
     /// # Errors
-    /// [`Error::Table`] if its rows are of different lengths; as [`Table::new`].
+    /// [`Error::Table`] if it cannot be read; as [`Table::new`].
     pub fn from_csv(caption: impl Into<String>, csv: &str) -> Result<Self> {
         let caption = caption.into();
         let failed = |error: csv::Error| Error::Table {
             name: caption.clone(),
             problem: error.to_string(),
         };
-        let mut reader = csv::Reader::from_reader(csv.as_bytes());
+        // Rows of other lengths are reported by `new`.
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .from_reader(csv.as_bytes());
         let head = words(reader.headers().map_err(failed)?);
         let rows = reader
             .records()
@@ -104,14 +113,14 @@ impl Table {
         &self.head
     }
 
-    /// Rows below the head, each as many cells as there are columns.
+    /// Its rows.
     pub fn rows(&self) -> &[Vec<String>] {
         &self.rows
     }
 
     /// Whether a column has numbers, if anything.
     fn is_numeric(&self, column: usize) -> bool {
-        let mut cells = self.rows.iter().filter_map(|row| row.get(column));
+        let mut cells = self.rows.iter().map(|row| row[column].as_str());
         cells.all(|cell| is_missing(cell) || is_number(cell))
     }
 
@@ -237,7 +246,7 @@ mod tests {
         );
         let text = message(Table::from_csv("uneven.csv", "a,b\n1\n"));
         assert!(
-            text.contains("uneven.csv") && text.contains("line: 2") && text.contains("1 fields"),
+            text.contains("uneven.csv") && text.contains("row 0") && text.contains("1 cells"),
             "{text}"
         );
         let text = message(Table::from_csv("empty.csv", ""));

@@ -483,6 +483,23 @@ mod tests {
     }
 
     #[test]
+    fn a_power_law_is_straight_on_logarithmic_axes() {
+        let steps = (0..=60).map(|k| 10.0_f64.powf(-3.0 + f64::from(k) / 20.0));
+        let axes = (
+            Axis::log("h").with_range(1e-3, 1.0),
+            Axis::log("e").with_range(1e-6, 1.0),
+        );
+        let chart = LineChart::new("", axes.0, axes.1);
+        let chart = chart.with_curves([Series::of("", steps, |h| [h, h * h])]);
+        let figure = Figure::from(chart);
+        let picture = picture(&figure);
+        for t in [0.2, 0.5, 0.8] {
+            let (x, y) = place(&figure, [t, t]);
+            assert!(has_near(&picture, BLUE, [x, y], 0.6), "not straight at {t}");
+        }
+    }
+
+    #[test]
     fn points_that_cannot_be_shown_interrupt_the_curve() {
         let points = [0.1, 0.4, f64::NAN, 0.6, 0.9].map(|t| [t, t]);
         let figure = Figure::from(unit_square("Gap").with_curves([Series::new("", points)]));

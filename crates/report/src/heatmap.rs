@@ -24,7 +24,7 @@ pub struct Heatmap {
 
 impl Heatmap {
     /// A heat map with its axes and its colour bar. Ranges of the axes are the outer edges of the cells, 0 to 1 if there is none; without
-    /// a range the colours span the data, which then must not be constant.
+    /// a range the colours span the data.
     ///
     /// Values are in grid order: `values[i * shape[1] + j]` belongs to the `i`-th position along the
     /// horizontal axis and the `j`-th along the vertical one (row-major, last axis fastest, `y` up).
@@ -48,7 +48,11 @@ impl Heatmap {
     /// The heat map with the ends of its axes.
     pub(crate) fn checked(&self, fonts: Fonts) -> Result<Coloured<'_>> {
         Error::check_shape(&self.title, self.shape, self.values.len())?;
-        let colours = self.bar.resolve(self.values.iter().copied(), 0.0)?;
+        let mut values = self.values.iter().copied().filter(|&v| self.bar.shows(v));
+        let first = values.next();
+        let constant = values.all(|v| Some(v) == first);
+        let padding = if constant { 0.05 } else { 0.0 };
+        let colours = self.bar.resolve(self.values.iter().copied(), padding)?;
         let colours = colours.ok_or_else(|| Error::Empty(self.title.clone()))?;
         let bar = Ruler::new(&self.bar, colours, fonts);
         let ends = [&self.x, &self.y].map(|axis| axis.range.unwrap_or([0.0, 1.0]));

@@ -104,6 +104,7 @@ fn is_metric_name(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
     use serde_json::json;
 
     #[test]
@@ -165,5 +166,18 @@ mod tests {
         let error = summary.insert("a", 2.0).unwrap_err();
         assert!(matches!(error, Error::DuplicateMetric { .. }));
         assert_eq!(summary.metrics["a"].as_f64(), Some(1.0));
+    }
+
+    proptest! {
+        #[test]
+        fn every_finite_number_survives(
+            value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO,
+        ) {
+            let mut summary = Summary::new();
+            summary.insert("metric", value).unwrap();
+            let text = serde_json::to_string_pretty(&summary).unwrap();
+            let read: BTreeMap<String, f64> = serde_json::from_str(&text).unwrap();
+            prop_assert_eq!(read["metric"].to_bits(), value.to_bits());
+        }
     }
 }
