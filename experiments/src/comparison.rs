@@ -129,6 +129,8 @@ fn run(setting: &Setting, options: &Options) -> Result<()> {
     let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
     let variants = options.study.variants(flow, stable);
     let study = Study::new(&options.study.networks, &variants)?;
+    let message = "no method is left: choose other --methods, --scheme or --cells";
+    require(!study.plan.is_empty(), message)?;
     let parameters = json!({
         "shape": setting.shape, "flow": flow, "side": setting.sample.side,
         "cells": cells, "reference_n": reference_n, "reference_steps_per_step": setting.reference_ratio,

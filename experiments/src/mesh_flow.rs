@@ -63,11 +63,9 @@ impl MeshFlow {
         let initial = session.phase("signed distance", |stage| {
             mesh.phase_field(setting.grid, setting.scales.eps, &stage.bar)
         })?;
-        let chosen = &options.mesh;
-        let papers = chosen.mesh.is_none() && chosen.volume.is_none() && !chosen.procedural;
         let energy = |&(step, w): &(usize, Option<f64>)| {
             let step = if step > 1 { step + more } else { step };
-            (step, w.filter(|_| papers))
+            (step, w.filter(|_| mesh.is_papers))
         };
         let surface = Surface {
             key: self.program,

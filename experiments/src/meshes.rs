@@ -80,6 +80,8 @@ pub struct Loaded {
     pub title: String,
     /// File with its checksum, measures, what was mended: for manifests.
     pub about: Value,
+    /// Whether it is the mesh of the paper, with which its numbers can be compared.
+    pub is_papers: bool,
 }
 
 enum Shape {
@@ -105,6 +107,7 @@ impl MeshOptions {
                 shape: Shape::Volume(values, self.volume_holds),
                 title,
                 about,
+                is_papers: false,
             });
         }
         let (mesh, title, mut about) = if self.procedural {
@@ -124,6 +127,7 @@ impl MeshOptions {
             shape: Shape::Distance(MeshDistance::new(&mesh.placed(&placement))),
             title,
             about,
+            is_papers: self.mesh.is_none() && !self.procedural,
         })
     }
 

@@ -14,7 +14,8 @@ pub struct RunOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Folder for the results, where an interrupted run continues [default: results/NAME, the name of the program]
+    /// Folder for the results, where an interrupted run continues [default: results/NAME, the name of the program, or
+    /// results/NAME-quick]
     #[arg(long, value_name = "DIR")]
     pub output: Option<PathBuf>,
 

@@ -52,7 +52,8 @@ impl Session {
         let device = options.open_device()?;
         parameters["quick"] = options.quick.into();
         let folder = options.output.clone();
-        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(program));
+        let usual = format!("{program}{}", options.either("-quick", ""));
+        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(usual));
         let output = OutputDir::create(folder)?;
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();

@@ -68,13 +68,13 @@ impl StorageOptions {
         require(cells.all(possible), message)
     }
 
-    /// What is measured, for the manifest; a mesh that cannot be read is refused.
+    /// What is measured, for the manifest; what cannot be read, or is not for all of the grids, is refused.
     pub fn about(&self, run: &RunOptions) -> Result<Value> {
         let [curve_cells, surface_cells] = self.cells(run);
-        let mesh = match surface_cells.first() {
-            Some(&n) => self.mesh(run, n)?.1.about,
-            None => Value::Null,
-        };
+        let mut mesh = Value::Null;
+        for &n in &surface_cells {
+            mesh = self.mesh(run, n)?.1.about;
+        }
         Ok(json!({
             "mesh": mesh, "surface_cells": surface_cells, "dense_up_to": self.dense_up_to, "curve_cells": curve_cells,
         }))
@@ -96,13 +96,9 @@ impl StorageOptions {
     }
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution.
-    pub fn measure(
-        &self,
-        networks: &NetworkOptions,
-        session: &mut Session,
-    ) -> Result<Vec<Measured>> {
-        let networks = networks.load(&[needed_network()])?;
-        let mut dense_or_bricks = networks.learned(Scheme::Accurate, &needed_network())?;
+    pub fn measure(&self, session: &mut Session) -> Result<Vec<Measured>> {
+        let shipped = Chosen::default();
+        let mut dense_or_bricks = shipped.learned(Scheme::Accurate, &needed_network())?;
         let quick = session.options.quick;
         let [curves, surfaces] = self.cells(&session.options);
         let mut measured = Vec::new();

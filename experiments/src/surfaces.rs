@@ -143,7 +143,7 @@ pub struct Flowed {
     pub surface: Surface,
     pub trajectory: Trajectory<3>,
     pub snapshots: Vec<Snapshot>,
-    /// Largest resident memory of the process during the steps, in MiB, where the system tells.
+    /// Largest resident memory of the process during the steps, in MiB, where the system tells, and unless some of them were stored.
     peak_mib: Option<f64>,
 }
 
@@ -158,11 +158,12 @@ impl Surface {
         memory::release_kept();
         memory::forget_peak();
         let trajectory = session.trajectory(&run, case, &folder, &samples)?;
+        let peak_mib = memory::peak_mib().filter(|_| trajectory.is_new);
         let mut flowed = Flowed {
             surface: self,
             trajectory,
             snapshots: Vec::new(),
-            peak_mib: memory::peak_mib(),
+            peak_mib,
         };
         memory::release_kept();
         let last = flowed.trajectory.steps();

@@ -226,7 +226,7 @@ pub struct CommonOptions {
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
 
-    /// Seed of all random numbers
+    /// Seed of the random numbers of check and train; flows have none
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
@@ -243,7 +243,7 @@ pub struct MessageOptions {
     #[arg(long, global = true)]
     pub quiet: bool,
 
-    /// Print the outcome as one JSON object
+    /// Print the outcome as one JSON object, with --label all one for each label
     #[arg(long, global = true)]
     pub json: bool,
 
@@ -309,11 +309,12 @@ pub struct RunOptions {
 pub struct FlowOptions {
     /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
     /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
-    /// step is divided [default: controlled; inpaint: a ramp; fair: graded]
+    /// step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled
+    /// where only --steps or --time end it]
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 
-    /// The estimated time error that controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
+    /// About what estimated time error controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
     /// part of how far the surface moves in it in percent [default: 1.5%]
     #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<Amount>,

@@ -73,11 +73,13 @@ impl Error {
 
     /// Of a mesh that bounds nothing, and that can perhaps be repaired.
     pub fn mesh(error: surfaces::Error) -> Self {
-        use surfaces::Error::{MixedOrientation, Nesting, NonManifold, Open};
+        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open};
         match error {
-            Open { .. } | NonManifold { .. } | MixedOrientation { .. } | Nesting { .. } => {
-                Self::Options(format!("{error}, or give --repair"))
-            }
+            Open { .. }
+            | NonManifold { .. }
+            | MixedOrientation { .. }
+            | Nesting { .. }
+            | NoArea { .. } => Self::Options(format!("{error}, or give --repair")),
             error => error.into(),
         }
     }

@@ -351,7 +351,7 @@ impl<'a> Reader<'a> {
                 self.cells(),
                 100.0 * thin / mesh.bounding_box().longest_side(),
                 found.unwrap_or_default(),
-                far_from(mesh, surface.as_ref()),
+                far_from(mesh, surface.as_ref(), &field),
             );
             if let Some(advice) = refused {
                 refuse!("{message}; {advice}");
@@ -436,7 +436,7 @@ impl<'a> Reader<'a> {
             "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
             self.cells(),
             grid.spacing(),
-            far_from(start, surface.as_ref())
+            far_from(start, surface.as_ref(), &field)
         ));
         let region = own.nodes(grid);
         let space = Space {
@@ -519,6 +519,7 @@ impl<'a> Reader<'a> {
             Some(Inside::Dark) => Side::Dark(threshold),
             Some(Inside::Light) => Side::Light(threshold),
         };
+        let plane = Plane::of_image(&image, path)?;
         let tones = Tones::of(&image, side);
         if self.options.inside.is_none() && self.options.threshold.is_none() {
             refuse_photographs(&tones, side, path)?;
@@ -528,7 +529,6 @@ impl<'a> Reader<'a> {
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = stored_phase_field(grid, &distance, self.eps(&grid))?;
-        let plane = Plane::of_image(&image, path)?;
         Ok(Loaded::Plane(self.start(field, plane)))
     }
 
@@ -619,10 +619,15 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// How far the zero level set is from a mesh, in words.
-fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>) -> String {
+/// How far the surface of a phase field is from a mesh, in words.
+fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>, field: &Stored<3>) -> String {
     let Some(surface) = surface else {
-        return "one that touches itself".to_owned();
+        let what = if has_interface(field) {
+            "one that touches itself"
+        } else {
+            "not there at all"
+        };
+        return what.to_owned();
     };
     let far = hausdorff_distance(surface, mesh);
     let percent = 100.0 * far / mesh.bounding_box().longest_side();

@@ -44,16 +44,18 @@ pub fn sentences(outcome: &Value) -> Vec<String> {
     text.extend(sizes.reduce(|all, next| format!("{all}, {next}")));
     let is_new = mesh["left_behind_percent"].is_null();
     if let Some(moved) = mesh["displacement_rms"].as_f64() {
-        let of = |name: &str| mesh[name].as_f64().unwrap_or(f64::NAN);
+        let of = |name: &str| mesh[name].as_f64();
+        let length = |name: &str| of(name).unwrap_or_default();
         let what = if is_new { "the surface" } else { "vertices" };
+        let sizes = match (of("volume_change_percent"), of("area_change_percent")) {
+            (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
+            _ => "the mesh is no longer closed, or folds over itself".to_owned(),
+        };
         text.push(format!(
-            "{what} moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; \
-             volume {:+.4} %, area {:+.3} %",
-            of("displacement_largest"),
-            of("displacement_rms_percent"),
-            of("displacement_largest_percent"),
-            of("volume_change_percent"),
-            of("area_change_percent"),
+            "{what} moved by {moved:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}",
+            length("displacement_largest"),
+            length("displacement_rms_percent"),
+            length("displacement_largest_percent"),
         ));
     }
     let left_behind = mesh["left_behind_percent"].as_f64();

@@ -80,11 +80,8 @@ impl Files<'_> {
         };
         if let Some(bytes) = self.read(presentation::DISPLACEMENT)? {
             let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
-            let what = match self.before() {
-                own::INPUT => "vertices have",
-                _ => "surface has",
-            };
-            let caption = format!("How far the {what} gone, as colours and as a histogram.");
+            let caption =
+                "How far the surface has gone at its vertices, as colours and as a histogram.";
             section.push(Figure::new(image, caption));
         }
         Ok(Some(section))

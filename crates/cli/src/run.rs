@@ -8,7 +8,7 @@ use engine::{Checkpoints, Event, Observer, Storage, Store, estimated_time_error}
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{MessageOptions, RunOptions};
+use crate::cli::{InputOptions, MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
 use crate::page;
@@ -57,7 +57,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         } else {
             "the whole grid".to_owned()
         };
-        let gigabytes = 1e-9 * Storage::bytes(nodes, stored);
+        let gigabytes = 1e-9 * Storage::bytes(run.case().flow, nodes, stored);
         self.messages.note(&format!(
             "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
         ));
@@ -302,13 +302,22 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
     }
 }
 
-/// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays, and so does one with something else.
-pub fn make_way(folder: &Path) -> Result<()> {
+/// Removes the run in a folder, if there is one that nobody works on. A folder of something else stays, and so does one with something else,
+/// or with the input.
+pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
     let stored = match RunDirectory::recover(folder) {
         Ok(stored) => stored,
         Err(locked @ runs::Error::Locked(_)) => return Err(locked.into()),
         Err(_) => return Ok(()),
     };
+    let whole = |path: &Path| path.canonicalize().ok();
+    if let (Some(input), Some(folder)) = (input.input.as_deref(), whole(folder))
+        && whole(Path::new(input)).is_some_and(|input| input.starts_with(folder))
+    {
+        refuse!(
+            "{input} is in the folder of --output, which --force would remove: copy it elsewhere, or give another --output"
+        );
+    }
     stored.tidy()?;
     let name = |path: &Path| path.file_name()?.to_str().map(presentation::is_written);
     let mut others = stored.leftovers().filter(|path| path.exists());

@@ -1,5 +1,6 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
+use std::fs::File;
 use std::io::{Read, Write};
 
 use crate::cli::{Command, InputOptions, MessageOptions};
@@ -31,7 +32,9 @@ impl Standard {
                 refuse!("standard input is empty: pipe a mesh, an image or a field into it");
             }
             let path = stand_in("input", kind(&bytes));
-            std::fs::write(&path, bytes).map_err(files::Error::of("write", &path))?;
+            // Never through a link that somebody else has put there.
+            let written = File::create_new(&path).and_then(|mut file| file.write_all(&bytes));
+            written.map_err(files::Error::of("write", &path))?;
             input.input = Some(path.to_string_lossy().into_owned());
             standard.input = Some(path);
         }
@@ -52,9 +55,12 @@ impl Standard {
     }
 
     pub fn write(&self) -> Result<()> {
-        let Some(path) = self.output.as_ref().filter(|path| path.exists()) else {
+        let Some(path) = &self.output else {
             return Ok(());
         };
+        if !path.exists() {
+            refuse!("nothing is written to standard output: the shape has vanished");
+        }
         let written = std::io::stdout().write_all(&read(path)?);
         Ok(written.map_err(files::Error::of("write", "standard output"))?)
     }
@@ -90,7 +96,7 @@ fn stand_in(what: &str, format: &str) -> PathBuf {
 
 /// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.
 fn kind(bytes: &[u8]) -> &'static str {
-    const BEGINNINGS: [(&[u8], &str); 15] = [
+    const BEGINNINGS: [(&[u8], &str); 19] = [
         (b"ply", "ply"),
         (b"solid", "stl"),
         (b"\x89PNG", "png"),
@@ -98,12 +104,16 @@ fn kind(bytes: &[u8]) -> &'static str {
         (b"GIF8", "gif"),
         (b"II*\0", "tif"),
         (b"MM\0*", "tif"),
+        (b"II+\0", "tif"),
+        (b"MM\0+", "tif"),
         (b"RIFF", "webp"),
         (b"BM", "bmp"),
         (b"\x93NUMPY", "npy"),
         (b"\x1f\x8b", "nii.gz"),
         (b"\x5c\x01\0\0", "nii"),
         (b"\x1c\x02\0\0", "nii"),
+        (b"\0\0\x01\x5c", "nii"),
+        (b"\0\0\x02\x1c", "nii"),
         (b"<?xml", "vti"),
         (b"<VTKFile", "vti"),
     ];

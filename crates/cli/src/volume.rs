@@ -2,7 +2,7 @@
 
 use volumes::{Body, Inside, Volume};
 
-use crate::cli::InputOptions;
+use crate::cli::{InputOptions, MessageOptions};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Label;
@@ -60,6 +60,32 @@ pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
         );
     }
     Ok(Some(labels))
+}
+
+/// Does the same with each label, and goes on with the next where one fails, until it is interrupted.
+pub fn for_each(
+    labels: Vec<i64>,
+    messages: MessageOptions,
+    mut act: impl FnMut(i64) -> Result<()>,
+) -> Result<()> {
+    let mut failed = Vec::new();
+    for label in labels {
+        match act(label) {
+            Ok(()) => (),
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) => {
+                messages.warn(&format!("label {label}: {}", files::with_causes(&error)));
+                failed.push(label.to_string());
+            }
+        }
+    }
+    if !failed.is_empty() {
+        refuse!(
+            "these labels failed, as the warnings say: {}",
+            failed.join(", ")
+        );
+    }
+    Ok(())
 }
 
 /// The name of a file or folder for one of several labels.

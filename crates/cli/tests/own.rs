@@ -111,7 +111,10 @@ fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_other
         let count = moved(&mesh, &at(name).join("final.obj"), right);
         assert!(count > mesh.vertices.len() / 3, "{name}: {count}");
         let html = fs::read_to_string(at(name).join("index.html")).unwrap();
-        assert!(html.contains("How far the vertices have gone"), "{name}");
+        assert!(
+            html.contains("How far the surface has gone at its vertices"),
+            "{name}"
+        );
         let svg = fs::read_to_string(at(name).join("final.displacement.svg")).unwrap();
         assert!(svg.contains("in the units of the mesh"), "{name}");
     }
@@ -179,6 +182,25 @@ fn meshes_and_pictures_go_through_pipes() {
     assert!(check.status.success(), "{}", text(&check.stderr));
     let json = run(folder.path(), &["flow", "in.ply", "--save", "-"]);
     assert!(text(&json.stderr).contains("--json and --save -"));
+    let vanishing = [
+        "mcf",
+        "builtin:disc",
+        "--side-length",
+        "0.4",
+        "--steps",
+        "500",
+    ];
+    let vanished = program(folder.path())
+        .args(vanishing)
+        .args(["--cells", "32", "--save", "-"])
+        .output()
+        .unwrap();
+    let error = text(&vanished.stderr);
+    assert_eq!(vanished.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("nothing is written to standard output"),
+        "{error}"
+    );
     let empty = run(folder.path(), &["flow", "-"]);
     assert!(text(&empty.stderr).contains("standard input is empty"));
 }

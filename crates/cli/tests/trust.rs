@@ -9,7 +9,7 @@ use geometry::{SignedDistance, SignedDistanceExt};
 use images::{Frame, drawing};
 use render::{Picture, Rgb};
 
-use crate::common::{outcome, run, text};
+use crate::common::{outcome, program, run, text};
 
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = run(folder, arguments);
@@ -121,6 +121,12 @@ fn nothing_is_written_over_what_is_there() {
     assert!(line.contains("thesis.txt is not of the run"), "{line}");
     outcome(folder.path(), &["resume", "run", "--steps", "2"]);
     assert_eq!(fs::read(at("run/thesis.txt")).unwrap(), b"years");
+    // Nor a folder with the input.
+    fs::remove_file(at("run/thesis.txt")).unwrap();
+    let again = ["flow", "run/final.npy", "--output", "run", "--force"];
+    let line = refused(folder.path(), &again);
+    assert!(line.contains("is in the folder of --output"), "{line}");
+    assert!(at("run/final.npy").exists());
 }
 
 /// A ring of radii 150 and 75 pixels has the energy `pi / 150 + pi / 75`.
@@ -338,16 +344,25 @@ fn a_finished_run_goes_on_to_more_steps() {
         "--tau",
         "1e-6",
     ];
-    outcome(
-        folder.path(),
-        &[&flow[..], &["--steps", "4", "--output", "run"]].concat(),
-    );
-    let again = run(folder.path(), &["resume", "run"]);
+    let four = ["--steps", "4", "--output", "run", "--save", "cross.png"];
+    outcome(folder.path(), &[&flow[..], &four].concat());
+    let again = program(folder.path())
+        .args(["resume", "run"])
+        .output()
+        .unwrap();
     assert_eq!(again.status.code(), Some(0));
+    let told = text(&again.stdout);
+    assert!(
+        told.contains("4 steps are made; willmore resume run --steps N"),
+        "{told}"
+    );
+    let saved = folder.path().join("cross.png");
+    let before = fs::read(&saved).unwrap();
     let line = refused(folder.path(), &["resume", "run", "--steps", "3"]);
     assert!(line.contains("cannot go on: 3 steps are made"), "{line}");
     let more = outcome(folder.path(), &["resume", "run", "--steps", "8"]);
     assert_eq!(more["steps"], 8, "{more}");
+    assert_ne!(fs::read(&saved).unwrap(), before);
     let whole = outcome(
         folder.path(),
         &[&flow[..], &["--steps", "8", "--output", "whole"]].concat(),
@@ -522,4 +537,17 @@ fn open_meshes_are_refused_and_repaired_on_demand() {
     assert_eq!(whole.euler_characteristic(), lever.euler_characteristic());
     assert!((whole.volume() / lever.volume() - 1.0).abs() < 0.02);
     outcome(folder.path(), &[&flow[..], &["--repair"]].concat());
+    // A closed mesh of which a face has its corners on a line.
+    let mut mesh = lever.into_mesh();
+    let [a, b, c] = mesh.faces[100].map(|v| v as usize);
+    mesh.vertices[c] = [0, 1, 2].map(|i| 0.5 * (mesh.vertices[a][i] + mesh.vertices[b][i]));
+    mesh.normals = None;
+    surfaces::write(at("line.ply"), &mesh).unwrap();
+    let check = ["check", "line.ply"];
+    assert!(refused(folder.path(), &check).contains("--repair"));
+    outcome(
+        folder.path(),
+        &["sample", "line.ply", "--repair", "--save", "flat.ply"],
+    );
+    surfaces::ClosedMesh::new(surfaces::read(at("flat.ply")).unwrap()).unwrap();
 }

@@ -182,6 +182,16 @@ fn every_label_becomes_a_surface() {
         let low = mesh.bounding_box().lower[0];
         assert!((low - ORIGIN[0] - SIDE * first).abs() < 0.5 * SIDE, "{low}");
     }
+    // One that cannot be made does not keep the others from it.
+    std::fs::remove_file(folder.path().join("body-label7.stl")).unwrap();
+    let output = run(folder.path(), &sample);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("label 3: --save") && error.contains("as the warnings say: 3"),
+        "{error}"
+    );
+    closed(&folder.path().join("body-label7.stl"));
     let sample = [
         "sample",
         "two.nii",

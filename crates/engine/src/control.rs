@@ -13,7 +13,8 @@ pub struct ErrorControl {
     /// The estimated time error of a step over how far the interface moves in it.
     pub relative: f64,
     /// Instead, the [time error of the run](crate::estimated_time_error), a length: a step that ends at the time `t` may be off by `tau / t` of it.
-    /// Errors counted as delays then add up to no more than it while the interface slows down.
+    /// Errors counted as delays then add up to about that while the interface slows down. Steps up to half as bad again are kept, and the
+    /// shortest ones whatever their error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<f64>,
     /// The longest displacement of a stage over the interface width `eps`.

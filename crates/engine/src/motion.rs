@@ -3,7 +3,7 @@
 use std::any::Any;
 
 use fem::{FiniteElementStep, Statistics};
-use geometry::{Field, Stored};
+use geometry::Stored;
 use model::Network;
 use operators::ComputeDevice;
 use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
@@ -29,6 +29,9 @@ pub(crate) trait Motion<const D: usize> {
 
     /// All that the following steps depend on, after so many minimizations or steps and at this time.
     fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error>;
+
+    /// Goes to such a state.
+    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error>;
 
     /// Work of the linear solves inside finite elements so far.
     fn statistics(&self) -> Option<Statistics>;
@@ -107,16 +110,10 @@ impl<const D: usize> SolverFlow<D> {
                 for step in 1..=case.held.steps() {
                     flow.constrain(case.held.at(step as f64))?;
                 }
-                if let Some(state) = state {
-                    flow.restore(state)?;
-                }
                 Either::Willmore(Box::new(flow))
             }
             Flow::MeanCurvature => {
-                let from = match state {
-                    Some(state) => Field::from_values(*case.grid(), state.current.clone())?,
-                    None => case.initial.field()?,
-                };
+                let from = case.initial.field()?;
                 let flow = match &elements {
                     Some(step) => MeanCurvatureFlow::new(step.clone(), &from, device)?,
                     None => MeanCurvatureFlow::with_network(network(case), &from, &params, device)?,
@@ -124,11 +121,16 @@ impl<const D: usize> SolverFlow<D> {
                 Either::MeanCurvature(Box::new(flow))
             }
         };
-        Ok(Box::new(Self {
+        let order = case.steps.order;
+        let mut motion = Self {
             flow,
             elements,
-            order: case.steps.order,
-        }))
+            order,
+        };
+        if let Some(state) = state {
+            motion.restore(state)?;
+        }
+        Ok(Box::new(motion))
     }
 }
 
@@ -175,6 +177,13 @@ impl<const D: usize> Motion<D> for SolverFlow<D> {
         }
     }
 
+    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
+        match &mut self.flow {
+            Either::Willmore(flow) => flow.restore(state),
+            Either::MeanCurvature(flow) => flow.restore(state),
+        }
+    }
+
     fn statistics(&self) -> Option<Statistics> {
         self.elements.as_ref().map(FiniteElementStep::statistics)
     }
@@ -199,7 +208,7 @@ fn learned<const D: usize>(
     // Where bricks are no alternative.
     let dense_instead = || -> Result<_, Error> {
         if device.kind().is_cpu() {
-            Storage::check(case.grid(), case.grid().len(), false)?;
+            Storage::check(case.flow, case.grid(), case.grid().len(), false)?;
         }
         Ok(dense()?)
     };

@@ -19,7 +19,8 @@ pub struct Record {
     pub time: f64,
     /// Step size.
     pub tau: f64,
-    /// How often it was made again, shorter: because the minimization failed, or because a controlled step was too long.
+    /// How often it was halved: because the minimization failed, because a controlled step was too long, or because the interface moved too
+    /// far, now or in the step before.
     pub halvings: u32,
     /// Whether the interface moved so far that twice the size would have been too long; so that is not tried.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -114,7 +114,6 @@ impl<const D: usize> Run<D> {
         let clock = Instant::now();
         self.whole.take();
         let made = self.attempt()?;
-        self.torn = true;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
         let moved = self.distance(&now, self.stored());
         let travelled = self.distance(&now, &self.case.initial);
@@ -167,7 +166,8 @@ impl<const D: usize> Run<D> {
             }
             if let Err(error) = self.step() {
                 if let Some(store) = store.filter(|_| !self.torn) {
-                    store.commit(self, true)?;
+                    // What the step says is told, and the checkpoints before this one are there.
+                    let _ = store.commit(self, true);
                 }
                 return Err(error);
             }
@@ -227,6 +227,7 @@ impl<const D: usize> Run<D> {
             let constraints = self.case.held.at(ramped);
             let refused = match self.motion.advance(size, constraints, accept) {
                 Ok((minimization, true)) => {
+                    self.torn = true;
                     // Of what it may.
                     let part = match (longest, &before) {
                         (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
@@ -234,7 +235,9 @@ impl<const D: usize> Run<D> {
                     };
                     match before.as_ref().filter(|_| halvings < SHORTER) {
                         Some((state, _)) if part > 1.0 => {
-                            self.motion = motion(&self.case, Some(state), &self.device)?;
+                            let restored = self.motion.restore(state);
+                            restored.map_err(|source| self.failed(source))?;
+                            self.torn = false;
                         }
                         _ => {
                             return Ok(Attempt {
@@ -388,7 +391,7 @@ fn motion_in_memory<const D: usize>(
     let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
     let check = |stored| {
         if device.kind().is_cpu() {
-            Storage::check(case.grid(), stored, takes_bricks)
+            Storage::check(case.flow, case.grid(), stored, takes_bricks)
         } else {
             Ok(())
         }
@@ -442,5 +445,11 @@ fn values<const D: usize>(now: &Current<'_, D>, time: f64) -> Result<Values, Err
         let measured = measure.of(now, time)?;
         values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
     }
-    Ok(values)
+    match values.iter().find(|(_, value)| !value.is_finite()) {
+        Some((name, &value)) => {
+            let name = name.clone();
+            Err(Error::NotFinite { name, value, time })
+        }
+        None => Ok(values),
+    }
 }

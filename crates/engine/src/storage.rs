@@ -5,7 +5,7 @@ use geometry::Grid;
 use operators::memory;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::{Error, Flow};
 
 /// What of a phase field is stored and worked on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Display, Serialize, Deserialize)]
@@ -22,28 +22,32 @@ pub enum Storage {
     Bricks,
 }
 
-/// Bytes for each node of a flow on the whole grid, measured at 128 and 192 cells.
+/// Bytes for each node of Willmore flow on the whole grid, measured at 128 and 192 cells,
 const PER_NODE: f64 = 300.0;
+/// and of mean curvature flow, measured at 192 (110).
+const PER_NODE_OF_MCF: f64 = 120.0;
 /// Bytes for each stored cell of a flow on bricks, measured with the armadillo at 256 and 512 cells (329 and 317).
 const PER_CELL: f64 = 330.0;
 
 impl Storage {
     /// About how many bytes a flow takes on a grid of so many nodes of which so many are stored.
-    pub fn bytes(nodes: usize, stored: usize) -> f64 {
-        if stored < nodes {
-            PER_CELL * stored as f64
-        } else {
-            PER_NODE * nodes as f64
-        }
+    pub fn bytes(flow: Flow, nodes: usize, stored: usize) -> f64 {
+        let each = match flow {
+            _ if stored < nodes => PER_CELL,
+            Flow::Willmore => PER_NODE,
+            Flow::MeanCurvature => PER_NODE_OF_MCF,
+        };
+        each * stored as f64
     }
 
     /// Refuses a flow of which so many cells of a grid are stored if the memory is too small for it. Limits of containers are not looked at.
     pub(crate) fn check<const D: usize>(
+        flow: Flow,
         grid: &Grid<D>,
         stored: usize,
         takes_bricks: bool,
     ) -> Result<(), Error> {
-        let needed = Self::bytes(grid.len(), stored);
+        let needed = Self::bytes(flow, grid.len(), stored);
         let short = |available: &f64| needed > *available;
         if memory::available().is_some_and(|available| short(&available)) {
             memory::release_kept();
@@ -79,10 +83,10 @@ mod tests {
     #[test]
     fn what_does_not_fit_into_memory_is_refused_with_what_does() {
         let small = Grid::<3>::centred(64, 1.0).unwrap();
-        assert!(Storage::check(&small, small.len(), true).is_ok());
+        assert!(Storage::check(Flow::Willmore, &small, small.len(), true).is_ok());
         // Ten thousand cells a side take 300 TB, which no machine has.
         let large = Grid::<3>::centred(10_000, 1.0).unwrap();
-        let Err(error) = Storage::check(&large, large.len(), true) else {
+        let Err(error) = Storage::check(Flow::Willmore, &large, large.len(), true) else {
             assert!(memory::available().is_none());
             return;
         };
@@ -102,9 +106,10 @@ mod tests {
         };
         assert!((needed - 300e3).abs() < 1.0);
         let nodes = fitting.pow(3);
-        assert!(fitting > 64 && Storage::bytes(nodes, nodes) <= available * 1e9);
+        assert!(fitting > 64 && Storage::bytes(Flow::Willmore, nodes, nodes) <= available * 1e9);
         // Where a sixteenth is stored, little more is needed.
-        let part = Storage::bytes(1 << 27, 1 << 23) / Storage::bytes(1 << 27, 1 << 27);
+        let part = Storage::bytes(Flow::Willmore, 1 << 27, 1 << 23)
+            / Storage::bytes(Flow::Willmore, 1 << 27, 1 << 27);
         assert!(part > 0.0625 && part < 0.08, "{part}");
     }
 }

@@ -141,6 +141,11 @@ pub fn notes(stored: &StoredRun) -> &Value {
     &stored.state().notes["application"]
 }
 
+/// The stop rule that ended a stored run, if it is over.
+pub fn ended(stored: &StoredRun) -> Result<Option<crate::Stop>, Error> {
+    read(stored, &stored.state().notes["ended"])
+}
+
 /// The dimension of a stored run.
 pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
     let dimension: usize = read(stored, &stored.state().notes["case"]["grid"]["dimension"])?;

@@ -26,6 +26,8 @@ pub struct Trajectory<const D: usize> {
     pub records: Vec<Record>,
     /// The stop rule that ended the run, perhaps in the middle of a step.
     pub ended: Stop,
+    /// Whether all of it was made now: nothing was looked up, and nothing continued.
+    pub is_new: bool,
     folder: PathBuf,
 }
 
@@ -49,6 +51,7 @@ impl<const D: usize> Trajectory<D> {
                     start: store::read(&stored, &notes["start"])?,
                     records: store::records(&stored)?,
                     ended: store::read(&stored, &notes["ended"])?,
+                    is_new: false,
                     folder: folder.to_owned(),
                 }));
             }
@@ -58,6 +61,7 @@ impl<const D: usize> Trajectory<D> {
                 (Store::create(folder, &[], &run, notes, CHECKPOINTS)?, run)
             }
         };
+        let is_new = run.records().is_empty();
         let mut samples = samples.clone();
         let mut all: Vec<&mut dyn Observer<D>> = vec![&mut samples];
         for observer in observers {
@@ -72,6 +76,7 @@ impl<const D: usize> Trajectory<D> {
             start: run.start,
             records: run.records,
             ended,
+            is_new,
             folder: folder.to_owned(),
         }))
     }

@@ -96,6 +96,10 @@ fn an_interrupted_run_continues_with_the_same_bytes() {
         // Looked up, not computed again: the wall time is that of the first time.
         let again = trajectory(&whole, &twice, &samples);
         assert_eq!(again.seconds().to_bits(), resumed.seconds().to_bits());
+        assert_eq!(
+            [&reference, &resumed, &again].map(|one| one.is_new),
+            [true, false, false]
+        );
         assert_eq!(again.distance(4, &reference, 4).unwrap().to_bits(), 0);
         let volume = |step: usize| reference.measures(step).unwrap()["volume"];
         assert_eq!(volume(4) > volume(0), flow == Flow::Willmore);

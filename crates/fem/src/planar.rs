@@ -206,8 +206,8 @@ impl ElementsOnPlanes {
                 &right - &self.apply(&linear, false, &v) - &self.apply(&cubic, false, &v);
             let correction = solve(&self.left(&v), &residual);
             v += &correction;
-            let largest = correction.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-            if largest < CONVERGED {
+            // Not for what is not a number.
+            if correction.iter().all(|c| c.abs() < CONVERGED) {
                 return Ok(v);
             }
         }

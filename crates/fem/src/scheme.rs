@@ -182,7 +182,7 @@ impl<const D: usize> Scheme<D> {
         self.heat_solve(&self.mass(&explicit))
     }
 
-    /// The implicit step: Newton's method from `u`, whose result depends on nothing else.
+    /// The implicit step: Newton's method from `u`, whose result depends on nothing else but the [tolerances](Tolerances).
     ///
     /// # Errors
     /// [`Error::NotConverged`] with the residual, [`Error::NonFinite`], [`Error::Factorization`].
@@ -261,11 +261,15 @@ impl<const D: usize> Scheme<D> {
     }
 
     fn cached_system(&self, v: &[f64]) -> Result<Arc<System<D>>, Error> {
-        let mut systems = lock(&self.systems);
-        if let Some(i) = systems.iter().position(|(at, _)| at == v) {
-            return Ok(systems[i].1.clone());
+        let found = (lock(&self.systems).iter())
+            .find(|(at, _)| at == v)
+            .map(|(_, system)| system.clone());
+        if let Some(system) = found {
+            return Ok(system);
         }
+        // Made on all cores, and so without the lock: a thread that waits for others may take up work that needs it.
         let system = Arc::new(self.system(v)?);
+        let mut systems = lock(&self.systems);
         if systems.len() >= CACHED_SYSTEMS {
             systems.remove(0);
         }
@@ -321,7 +325,7 @@ impl<const D: usize> Scheme<D> {
             let curvature = dot(&direction, &product);
             if !(curvature.is_finite() && curvature > 0.0) {
                 return Err(Error::NonFinite {
-                    field: "the curvature",
+                    field: "the curvature, which must be positive,",
                     solver: SOLVER,
                 });
             }

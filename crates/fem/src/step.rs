@@ -17,7 +17,7 @@ use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 
 /// A finite-element step of mean curvature flow: `v[u]` of Franken, Rumpf and Wirth's nested scheme.
 ///
-/// Cheap to clone; clones share matrices and statistics. Tensors may live on any device: the work is done in `f64` on the
+/// Cheap to clone; clones share matrices, tolerances and statistics. Tensors may live on any device: the work is done in `f64` on the
 /// host.
 ///
 /// ```
@@ -120,21 +120,22 @@ impl<const D: usize> FiniteElementStep<D> {
     /// One step of mean curvature flow.
     ///
     /// # Errors
-    /// As [`Scheme::implicit_step`].
+    /// As [`Scheme::implicit_step`], values that are not finite.
     ///
     /// # Panics
-    /// If `u` lives on another grid.
+    /// If `u` lives on another grid, wherever its origin is.
     pub fn step(&self, u: &Field<D>) -> Result<Field<D>, Error> {
+        let size = |grid: &Grid<D>| (grid.cells(), grid.spacing().to_bits());
         assert_eq!(
-            u.grid().cells(),
-            self.grid.cells(),
+            size(u.grid()),
+            size(&self.grid),
             "the phase field lives on another grid than the scheme"
         );
         let values = match self.kind {
             Kind::Implicit => self.scheme.implicit_step(u.values())?,
             Kind::SemiImplicit => self.scheme.semi_implicit_step(u.values()),
         };
-        Ok(Field::from_values(*u.grid(), values).expect("a step keeps the number of nodes"))
+        Ok(Field::from_values(*u.grid(), values)?)
     }
 
     /// `w = eps / (2 tautilde^2) |v[u] - u|^2`, the approximate Willmore energy of a phase field, in the norm of the mass

@@ -223,8 +223,13 @@ fn smoothed(original: Vec<[f64; 2]>, farthest: f64) -> Polyline {
         points,
         closed: true,
     };
-    let smooth = curve(points.clone());
-    let lost = curve(original).signed_area() - smooth.signed_area();
+    let (smooth, original) = (curve(points.clone()), curve(original));
+    let area = original.signed_area();
+    let lost = area - smooth.signed_area();
+    // A speck of a few pixels has shrunk to a point or nearly, and stays as it is.
+    if lost.abs() >= 0.5 * area.abs() {
+        return original;
+    }
     let outwards = lost / smooth.length();
     let moved = (0..count).map(|k| {
         let [before, after] = [points[(k + count - 1) % count], points[(k + 1) % count]];

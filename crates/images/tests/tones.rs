@@ -64,6 +64,25 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
     assert!((sides / length - 1.0).abs() < 1e-12);
 }
 
+/// Single pixels, which smoothing would shrink to points, and a dot of four pixels beside a disc.
+#[test]
+fn specks_stay_as_they_are() {
+    let specks = image(|x, y| {
+        let at = |x: f64, size: f64| x % 20.0 < size;
+        let dot = (at(x, 1.0) && at(y, 1.0)) || (x < 42.0 && y < 3.0 && at(x, 2.0) && y > 1.0);
+        f64::from(u8::from(radius(x, y) > 30.0 && !dot))
+    });
+    let rough = Outline::of_image(&specks, Side::Dark(0.5)).unwrap();
+    assert!(rough.curves().len() > 50);
+    let smooth = rough.smoothed(0.6).unwrap();
+    assert_eq!(smooth.curves().len(), rough.curves().len());
+    assert!((smooth.area() / rough.area() - 1.0).abs() < 1e-3);
+    let (before, after) = (rough.bounding_box(), smooth.bounding_box());
+    assert!((after.longest_side() - before.longest_side()).abs() < 1.2);
+    let centre = smooth.distance().signed_distance([80.0, 80.0]);
+    assert!((centre + 30.0).abs() < 0.6, "{centre}");
+}
+
 #[test]
 fn colours_are_those_of_the_file() {
     let pixels: Vec<[u8; 4]> = (0..48).map(|k| [k, 5 * k, 255 - k, 255 - 3 * k]).collect();

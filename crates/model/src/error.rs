@@ -16,7 +16,7 @@ pub enum Error {
         run: Ratios,
     },
     #[error(
-        "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these interface widths, or train a network: \
+        "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these, or train one: \
          willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
         wanted.dimension, wanted.width, wanted.eps_over_h, wanted.step_over_h2
     )]

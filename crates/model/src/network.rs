@@ -42,9 +42,10 @@ pub struct Provenance {
     pub seed: u64,
     /// Version of the program that trained it.
     pub version: String,
-    /// Loss (eq:mcf_scheme_optimization_discrete) on the training samples.
+    /// What the training reported last: the loss (eq:mcf_scheme_optimization_discrete) on its samples, and for the accurate recipe, whose
+    /// last part imitates its function by a perceptron, the residual of that.
     pub training_loss: f64,
-    /// The same on held-out radii, whole grid.
+    /// Loss (eq:mcf_scheme_optimization_discrete) on held-out radii, whole grid.
     pub held_out_loss: f64,
     /// Held-out loss with both phases exchanged.
     pub flipped_loss: f64,

@@ -109,18 +109,16 @@ impl Networks {
                 network: network.clone(),
             });
         }
-        let mut available: Vec<f64> = (all.iter().map(|(_, network)| network.ratios()))
+        let ratios = all.iter().map(|(_, network)| network.ratios());
+        let list: Vec<String> = ratios
             .filter(|ratios| ratios.dimension == needed.dimension)
-            .map(|ratios| ratios.eps_over_h)
+            .map(|ratios| ratios.to_string())
             .collect();
-        available.sort_by(f64::total_cmp);
-        available.dedup();
-        let list: Vec<String> = (available.iter().map(|eps| format!("eps/h = {eps}"))).collect();
         let usual = 8 * needed.eps_over_h.clamp(1.0, 64.0).ceil() as usize + 1;
         Err(Error::MissingNetwork {
             recipe: shipped.recipe(),
             wanted: needed.ratios(usual),
-            available: list.join(", "),
+            available: list.join("; "),
         })
     }
 }

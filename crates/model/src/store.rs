@@ -68,13 +68,18 @@ impl Network {
     /// `checksum` of all of it.
     ///
     /// # Errors
-    /// [`Error::Weights`] if the metadata cannot be encoded, or are longer than a reader accepts.
+    /// [`Error::Weights`] if the metadata cannot be encoded, have losses that are not finite, or are longer than a reader accepts.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         let failed = |reason: String| Error::Weights {
             path: "network".into(),
             reason,
         };
         let unencodable = |e: serde_json::Error| failed(e.to_string());
+        let of = &self.provenance;
+        let losses = [of.training_loss, of.held_out_loss, of.flipped_loss];
+        if !losses.iter().all(|loss| loss.is_finite()) {
+            return Err(failed(format!("its losses {losses:?} are not finite")));
+        }
         let metadata = Metadata {
             format: FORMAT.to_owned(),
             ratios: self.ratios(),

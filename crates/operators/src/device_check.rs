@@ -10,7 +10,7 @@ use burn::tensor::Device;
 use crate::convolution::convolve;
 use crate::{ComputeDevice, DeviceKind, Error, circular_convolution};
 
-/// Relative difference to the CPU accepted in single precision.
+/// Difference to the CPU accepted in single precision, for values of size 1.
 const LIMIT: f64 = 1e-4;
 
 pub(crate) fn open_gpu(

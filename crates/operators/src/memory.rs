@@ -10,7 +10,7 @@ pub fn keep_freed() {
     {
         const KEPT: libc::c_int = 128 << 20;
         #[allow(unsafe_code, reason = "a call into the C library without pointers")]
-        // SAFETY: `mallopt` takes two integers and may be called at any time.
+        // SAFETY: `mallopt` takes two integers; this is called before there are other threads.
         unsafe {
             // No vector is mapped on its own, however large it is: glibc accepts no threshold above 32 MiB.
             libc::mallopt(libc::M_MMAP_MAX, 0);
@@ -19,7 +19,7 @@ pub fn keep_freed() {
     }
 }
 
-/// Gives all memory back to the system that is only kept for later use: spectra of kernels, plans and buffers of convolutions, and
+/// Gives memory back to the system that is only kept for later use: spectra of kernels, plans and buffers of convolutions, and
 /// what the allocator keeps. For instance between two computations with large vectors of different sizes.
 pub fn release_kept() {
     f32::shared().clear();

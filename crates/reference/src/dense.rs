@@ -68,7 +68,7 @@ pub(crate) struct Newton {
 }
 
 impl Newton {
-    /// Newton's method until a step has no entry larger than `tolerance`, or none is better than the one before.
+    /// Newton's method until a step has no entry larger than `tolerance`, or for 30 iterations.
     pub(crate) fn solve(f: &impl Fn(&[f64]) -> Vec<f64>, start: Vec<f64>, tolerance: f64) -> Self {
         const MOST_ITERATIONS: usize = 30;
         let mut result = Self {
@@ -82,13 +82,8 @@ impl Newton {
             for (x, s) in result.solution.iter_mut().zip(&step) {
                 *x -= s;
             }
-            result.step = step.iter().fold(0.0, |largest: f64, s| {
-                if s.is_nan() {
-                    f64::NAN
-                } else {
-                    largest.max(s.abs())
-                }
-            });
+            let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
+            result.step = step.iter().map(|s| s.abs()).fold(0.0, larger);
             result.iterations += 1;
         }
         result

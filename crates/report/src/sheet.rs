@@ -66,7 +66,7 @@ impl<'a, R> Sheet<'a, R> {
         self.with_column(head.into(), Some(format), |row| value(row).into())
     }
 
-    /// Adds a column for programs: text, or numbers with as many digits as they have.
+    /// Adds a column for programs: text, or numbers with as many digits as they have, up to nine.
     pub fn data<C: Into<Cell>>(self, head: &str, value: impl Fn(&'a R) -> C) -> Self {
         self.column(head, Format::Shortest, value)
     }
@@ -98,7 +98,17 @@ impl<'a, R> Sheet<'a, R> {
         (head, format): (&str, Format),
         value: impl Fn(&'a R) -> C,
     ) -> Self {
-        self.metric(name, &value).column(head, format, value)
+        let mut sheet = self.column(head, format, value);
+        let cells = sheet
+            .table
+            .rows
+            .iter()
+            .filter_map(|row| row.last().cloned());
+        let metric = |(row, cell)| ((sheet.key)(row, name), cell);
+        sheet
+            .metrics
+            .extend(sheet.rows.iter().zip(cells).map(metric));
+        sheet
     }
 
     /// Adds a column for each of these numbers, given by heading, format and name.

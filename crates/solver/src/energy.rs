@@ -61,7 +61,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
 /// What the outer iteration asks of an inner solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
-    /// `c = tau / tautilde^2`, the factor by which the energy magnifies errors of the step.
+    /// `c`, the [stiffness](crate::FlowParams::stiffness): the factor by which the energy magnifies errors of the step.
     pub stiffness: f64,
     /// Accuracy of the minimizer, relative to the motion.
     pub tolerance: f64,
@@ -126,7 +126,7 @@ pub trait Objective<const D: usize> {
 /// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
 ///
 /// `E(u) = 1/2 |u - a|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
-/// `c = tau / tautilde^2`,
+/// the [stiffness](crate::FlowParams::stiffness) `c`,
 ///
 /// so that its Hessian is the identity (or mass matrix) plus what the curvature adds; [`HelfrichTerms`] change the second term. The anchor `a` is `u_k` in an implicit Euler step.
 /// Stages of second-order steps have other anchors, and weigh the motion by positive numbers that are fixed during the minimization:
@@ -204,7 +204,7 @@ impl<const D: usize> MinimizingMovement<D> {
         })
     }
 
-    /// Sets the anchor and `c = tau / tautilde^2`.
+    /// Sets the anchor and `c`, the [stiffness](crate::FlowParams::stiffness).
     ///
     /// # Errors
     /// [`Error::Geometry`] unless `c` is positive and finite.

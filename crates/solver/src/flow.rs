@@ -24,7 +24,6 @@ mod second_order;
 mod start;
 
 pub use second_order::StepEstimates;
-use start::every_other_node;
 pub use start::{Start, StartKind};
 
 /// Scales of a flow.
@@ -293,9 +292,7 @@ impl<const D: usize> WillmoreFlow<D> {
         if let Some(active) = &self.active {
             region = region.on(&active.bricks, &self.device);
         }
-        if let Some(half) = &mut self.half {
-            half.restrict_to(&every_other_node(self.grid, nodes))?;
-        }
+        self.restrict_half(nodes)?;
         self.region = Some(region);
         Ok(())
     }
@@ -705,8 +702,21 @@ impl<const D: usize> MeanCurvatureFlow<D> {
     /// # Errors
     /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
     pub fn field(&self) -> Result<Field<D>, Error> {
-        download(&self.grid, &self.current, &self.device)
-            .map_err(|_| Error::non_finite(self.step, "phase field"))
+        download(&self.grid, &self.current, &self.device).map_err(|error| match error {
+            Error::Geometry(_) => Error::non_finite(self.step, "phase field"),
+            error => error,
+        })
+    }
+
+    /// Goes to a state of a flow with the same grid.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for another number of values, or values that are not finite.
+    pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
+        let field = Field::from_values(self.grid, state.current.clone())?;
+        self.current = upload(&field, &self.device)?;
+        self.step = state.step;
+        Ok(())
     }
 }
 

@@ -463,9 +463,13 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         if point.energy > self.info.energy_before {
             // An extrapolation that made things worse is dropped. Where a target moves, so does the energy of standing still.
             let rest = self.point(self.found(self.previous, false)?)?;
-            if rest.energy < point.energy {
-                point = rest;
-            }
+            point = if rest.energy < point.energy {
+                rest
+            } else {
+                // The objective's own point is that of rest by now.
+                let Point { u, tangent, .. } = point;
+                self.point(Place { u, tangent })?
+            };
         }
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;

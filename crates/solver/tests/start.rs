@@ -176,6 +176,18 @@ fn a_region_is_held_on_both_grids() {
         }
         assert!(moved > 0.1, "{moved}");
     }
+    // A region between the nodes of the half grid.
+    let column: Vec<bool> = (0..grid().len())
+        .map(|node| grid().multi_index(node)[1] == 129)
+        .collect();
+    for region_first in [true, false] {
+        let mut flow = flow(!region_first);
+        flow.restrict_to(&column).unwrap();
+        if region_first {
+            flow.begin_on_half_grids(&accurate(256, 33)).unwrap();
+        }
+        assert_eq!(flow.advance(TAU).unwrap().start.kind, StartKind::Rest);
+    }
 }
 
 #[test]

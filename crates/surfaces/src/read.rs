@@ -8,6 +8,7 @@ mod stl;
 use std::path::Path;
 
 use crate::format::Format;
+use crate::vector::Vector;
 use crate::{Error, TriangleMesh};
 use error::FormatError;
 
@@ -68,8 +69,8 @@ pub fn vertex_colours(bytes: &[u8], path: impl AsRef<Path>) -> Result<Option<Vec
 /// `bytes`, in the same order.
 ///
 /// Everything else stays as it is: polygons, texture coordinates, colours, groups, materials, attributes, comments. Normals in the
-/// file are made anew from the faces that refer to them, weighted by area in OBJ and by angle in PLY. Coordinates are rounded to the
-/// type that the file has.
+/// file are made anew from the faces that refer to them, weighted by area in OBJ and by angle in PLY, on the side of the old ones.
+/// Coordinates are rounded to the type that the file has.
 ///
 /// # Errors
 /// [`Error::UnknownFormat`]; [`Error::Format`] for bytes that are no such mesh, and for a PLY file whose coordinates are integers.
@@ -94,6 +95,14 @@ fn by_format<T>(
         path: path.into(),
         problem,
     })
+}
+
+/// 1, or -1 if the normals in a file, the second ones, point against most of those that its faces have by the way they wind.
+fn side_of(normals: impl Iterator<Item = (Vector, Vector)>) -> f64 {
+    let agreement: f64 = normals
+        .map(|(by_faces, read)| by_faces.normalize_or_zero().dot(read.normalize_or_zero()))
+        .sum();
+    if agreement < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// A part of 1 in 255 steps.

@@ -29,7 +29,8 @@ struct Sides {
 
 impl Sides {
     fn of(distance: Stored<3>) -> Self {
-        let clear = 0.5 * distance.grid().spacing();
+        // A flat face in the middle between nodes, the farthest from both, is near the one and the other.
+        let clear = 0.5 * (1.0 + 1e-9) * distance.grid().spacing();
         let values = distance.values();
         let mut inside: Vec<bool> = values.iter().map(|s| *s < 0.0).collect();
         let mut seen: Vec<bool> = values.iter().map(|s| s.abs() <= clear).collect();

@@ -288,6 +288,14 @@ fn wrong_signs_are_mended_and_right_ones_stay() {
     let (mended, changed) = mend_signs(Stored::whole(wrong));
     assert!(changed > 4);
     assert_eq!(mended.field().unwrap(), right);
+    // A box with faces in the middle between nodes, up to rounding.
+    let spacing = grid.spacing();
+    let half = 4.5 * spacing;
+    let right = Field::from_fn(grid, |x| {
+        (1.0 + 1e-12) * (x.iter().fold(0.0, |far: f64, x| far.max(x.abs())) - half)
+    });
+    let (mended, changed) = mend_signs(Stored::whole(right.clone()));
+    assert_eq!((mended.field().unwrap(), changed), (right, 0));
 }
 
 /// Of a distance of which only what is near is stored, also whole bricks of which nothing is.

@@ -230,6 +230,24 @@ fn an_obj_file_keeps_everything_but_positions_and_normals() {
     assert_eq!(normals(&String::from_utf8(far).unwrap()), normals(&text));
 }
 
+/// Of a file whose faces wind the other way, so that its normals are right and those by the faces are not.
+#[test]
+fn normals_stay_on_their_side() {
+    let turned = QUAD.replace("vn 0 0 -1", "vn 0 0 1");
+    let mesh = decode(turned.as_bytes(), "a.obj").unwrap();
+    let text = rewrite(turned.as_bytes(), "a.obj", &mesh).unwrap();
+    assert!(String::from_utf8(text).unwrap().contains("vn 0 0 1\r\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cube.ply");
+    let mut inwards = cube(1.0);
+    inwards.normals = Some(inwards.vertex_normals());
+    inwards.faces.iter_mut().for_each(|face| face.swap(0, 1));
+    surfaces::write(&path, &inwards).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let mesh = decode(&bytes, "cube.ply").unwrap();
+    assert_eq!(rewrite(&bytes, "cube.ply", &mesh).unwrap(), bytes);
+}
+
 #[test]
 fn ply_and_stl_files_keep_everything_but_positions_and_normals() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,8 @@ pub struct Options {
     #[command(flatten)]
     study: StudyOptions,
 
-    /// Leave nested finite elements of Willmore flow out above this resolution; a circle takes minutes at n = 256
+    /// Leave nested finite elements of Willmore flow, which --full or --methods asks for, out above this resolution; a circle takes
+    /// minutes at n = 256
     #[arg(long, value_name = "N")]
     elements_up_to: Option<usize>,
 
@@ -44,10 +45,10 @@ pub fn program(options: &Options) -> Result<()> {
     let message = format!("--circles must be from 1 to {most}, not {count}");
     require((1..=most).contains(&count), message)?;
     let variants = options.variants();
-    let has = |flow| variants.iter().any(|variant| variant.flow == flow);
+    let study = Study::new(&options.study.networks, &variants)?;
+    let has = |flow| study.variants().any(|variant| variant.flow == flow);
     let message = "no method is left for one of the two flows: choose other --methods, --scheme or --elements-up-to";
     require(Flow::ALL.into_iter().all(has), message)?;
-    let study = Study::new(&options.study.networks, &variants)?;
     let parameters = json!({
         "cells": study.cells, "runs": study.variants().collect::<Vec<_>>(), "networks": study.checksums(),
         "circles": count, "steps": steps, "eps": EPS, "time_step": STEP,

@@ -1,4 +1,5 @@
 use std::ffi::OsStr;
+use std::io::Write;
 
 use crate::meshes;
 use crate::prelude::*;
@@ -54,7 +55,9 @@ pub fn program(options: &Options) -> Result<()> {
     }
     progress.clear();
     if !options.quiet {
-        println!(
+        // A closed pipe is no failure.
+        let _ = writeln!(
+            std::io::stdout(),
             "{path}: {} vertices, {} faces, genus {}; signed distance in {output}",
             mesh.mesh().vertices.len(),
             mesh.mesh().faces.len(),

@@ -96,7 +96,7 @@ pub fn program(options: &Options) -> Result<()> {
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
         all.push(Measurement::of("cross", &case, &mut session, turns)?);
     }
-    let stored = options.storage.measure(&options.networks, &mut session)?;
+    let stored = options.storage.measure(&mut session)?;
     for (name, n, steps) in solids {
         let operator = learned(surfaces::needed_network())?;
         let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
@@ -118,7 +118,7 @@ pub fn program(options: &Options) -> Result<()> {
         session.sheet(products, "products")?;
     }
     session.output.write_json("performance.json", &all)?;
-    session.figure(figure(&all), "performance")?;
+    session.figure(figure(&all, run.either("disc", "cross")), "performance")?;
     storages::write(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
 }
@@ -240,7 +240,11 @@ fn parts<const D: usize>(run: &Run<D>, floor_ms: f64) -> [(&'static str, f64); 7
 }
 
 /// The cost of a step, and where the time goes: a colour for each part, a line style for each dimension.
-fn figure(all: &[Measurement]) -> Figure {
+fn figure(all: &[Measurement], plane: &str) -> Figure {
+    let solids = all.iter().filter(|m| m.cells.len() == 3);
+    let solids: Vec<_> = solids
+        .map(|m| format!("a {} at n = {}", m.case, m.n))
+        .collect();
     let [mut cost, mut shares] = [
         ("cost of a step", "median step [s]"),
         ("where the time goes", "mean per step [s]"),
@@ -273,8 +277,9 @@ fn figure(all: &[Measurement]) -> Figure {
         .with_panel(shares.with_entries(parts).with_entries(entries))
         .with_shared_legend()
         .with_note(format!(
-            "2D: a cross, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: a cube at n = 64, a blob at n = 128, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost \
-             of a step ~ unknowns to the power {}.",
+            "2D: a {}, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: {}, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost of a step ~ unknowns to the power {}.",
+            plane,
+            solids.join(", "),
             rayon::current_num_threads(),
             slopes.join(" and ")
         ))

@@ -67,6 +67,10 @@ pub fn program(options: &Options) -> Result<()> {
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
     let variants: Vec<_> = schemes.map(|&scheme| (Method::Hybrid, scheme)).collect();
     let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
+    let end = MCF_STEPS[LAST] as f64 * setting.scales.mcf_step;
+    let message =
+        "the smallest sphere vanishes within the steps of mean curvature flow: give more --cells";
+    require(mean_curvature_radius(radii[0], end, 3) > 0.0, message)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
     let mut session = Session::open("spheres", run, parameters)?;

@@ -124,6 +124,7 @@ pub fn program(options: &Options) -> Result<()> {
         "cells": cells, "budget": budget, "steps": STEPS, "mesh": mesh.about,
     });
     let mut session = Session::open("timing_tables", run, parameters)?;
+    let shape = run.either("a disc", "the cross");
     let mut timings = Vec::new();
     for &n in cells {
         timings.extend(measure(&mut session, &networks, n, budget)?);
@@ -139,6 +140,7 @@ pub fn program(options: &Options) -> Result<()> {
             let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
             let initial = initial.clone();
             let run = stage.run(Case::willmore(&mesh.title, initial, operator, scales, time))?;
+            let papers_seconds = (mesh.is_papers && !quick).then_some(papers_seconds);
             steps.push((method, timing::numbers(&run), papers_seconds));
         }
         Ok(steps)
@@ -172,7 +174,7 @@ pub fn program(options: &Options) -> Result<()> {
     });
     let json: Vec<_> = json.collect();
     session.output.write_json("timing.json", &json)?;
-    session.figure(figure(&timings), "timing")?;
+    session.figure(figure(&timings, shape), "timing")?;
     for timing in timings.iter().filter(|timing| timing.usable()) {
         let key = format!("timing.n{}.{}", timing.n, timing.row.key);
         let times = times(timing, 1).map(|times| ("times_hybrid_measured_steps", times));
@@ -180,7 +182,9 @@ pub fn program(options: &Options) -> Result<()> {
             session.metric(&format!("{key}.{name}"), value)?;
         }
     }
-    session.finish("128 Willmore steps of the cross: wall time on this machine")
+    session.finish(&format!(
+        "128 Willmore steps of {shape}: wall time on this machine"
+    ))
 }
 
 fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> Result<Vec<Timing>> {
@@ -280,7 +284,7 @@ impl Timing {
 }
 
 /// Seconds over the resolution: solid lines for this machine, dashed ones for the paper.
-fn figure(timings: &[Timing]) -> Figure {
+fn figure(timings: &[Timing], shape: &str) -> Figure {
     let mut curves = Vec::new();
     for (k, row) in VARIANTS.iter().enumerate() {
         let marker = [Marker::Circle, Marker::Square, Marker::Triangle][k % 3];
@@ -297,7 +301,7 @@ fn figure(timings: &[Timing]) -> Figure {
     curves.retain(|curve| !curve.points.is_empty());
     let n = Axis::log("cells per unit length n");
     let chart = LineChart::new("", n, Axis::log("seconds for 128 steps")).with_curves(curves);
-    Figure::new("Willmore flow of a cross: wall time", 1)
+    Figure::new(format!("Willmore flow of {shape}: wall time"), 1)
         .with_panel(chart)
         .with_shared_legend()
         .with_note(

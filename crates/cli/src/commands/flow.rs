@@ -48,6 +48,14 @@ impl RunCommand {
                 "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
             );
         }
+        if let Some(flow) = self.willmore()
+            && let (Some(ramp), None, None, None) =
+                (flow.ramp, flow.volume, flow.area, flow.reduced_volume)
+        {
+            refuse!(
+                "--ramp {ramp} is for sizes that go to a target: give --volume, --area or --reduced-volume, or leave it out"
+            );
+        }
         Ok(())
     }
 
@@ -144,18 +152,16 @@ pub fn run(
     messages: MessageOptions,
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<()> {
-    // One run for each label of a volume, until one is interrupted.
     if let Some(labels) = volume::all_labels(&command.options().input)? {
-        for label in labels {
+        return volume::for_each(labels, messages, |label| {
             let mut one = command.clone();
             let options = one.options();
             options.input.label = Some(Label::One(label));
             for name in options.output.iter_mut().chain(&mut options.save) {
                 *name = volume::named(name, label);
             }
-            run(one, messages, None)?;
-        }
-        return Ok(());
+            run(one, messages, None)
+        });
     }
     command.check()?;
     let steps = command.usual_steps();
@@ -215,7 +221,7 @@ impl Job {
             None => free_folder(&format!("{}-{}", plan.name, plan.command)),
         };
         if plan.options.force.force {
-            make_way(&folder)?;
+            make_way(&folder, &plan.options.input)?;
         }
         let inputs = plan.presentation.inputs()?;
         let mut files = vec![(config::FILE, options.as_bytes())];

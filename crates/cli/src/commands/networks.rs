@@ -16,10 +16,12 @@ pub fn run(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<(
         messages.report(&Value::Array(list), &lines.join("\n"));
         return Ok(());
     };
+    let path = Path::new(wanted);
     let network = match all.find(|(name, _)| *name == stem(wanted)) {
-        Some((_, network)) => network,
-        None if Path::new(wanted).exists() => &Network::load(Path::new(wanted))?,
-        None => {
+        // With its extension the name is first of all that of a file.
+        Some((name, network)) if name == *wanted || !path.exists() => network,
+        _ if path.exists() => &Network::load(path)?,
+        _ => {
             refuse!(
                 "there is no network {wanted:?}, neither in the list of `willmore networks` nor as a file"
             );

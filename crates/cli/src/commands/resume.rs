@@ -17,7 +17,9 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
         refuse!("{path} names no command that makes runs");
     };
     let stored_options = command.options();
-    stored_options.force = options.force;
+    // A run that was over has written the file of --save itself.
+    let was_over = stored.is_finished() || !engine::notes(&stored)["steps"].is_null();
+    stored_options.force.force = options.force.force || was_over;
     if !stored.is_finished() || options.steps.is_some() {
         return flow::run(command, messages, Some((stored, options.steps)));
     }
@@ -29,9 +31,13 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
     let folder = options.run.to_string_lossy();
     let command = &engine::notes(&stored)["about"]["command"];
     let outcome = json!({ "command": command, "finished": true, "run": folder });
-    let text = format!(
-        "The run in {folder} is finished already; willmore resume {folder} --steps N goes on to N steps in all"
-    );
+    let advice = match engine::ended(&stored)? {
+        Some(stop @ Stop::Steps(_)) => {
+            format!(": {stop}; willmore resume {folder} --steps N goes on to N steps in all")
+        }
+        stop => stop.map_or(String::new(), |stop| format!(": {stop}")),
+    };
+    let text = format!("The run in {folder} is finished already{advice}");
     messages.report(&outcome, &text);
     Ok(())
 }

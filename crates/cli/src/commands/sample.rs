@@ -18,13 +18,12 @@ const EPS_OVER_H: f64 = 2.0;
 pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     let path = options.save.clone();
     if let Some(labels) = volume::all_labels(&options.input)? {
-        for label in labels {
+        return volume::for_each(labels, messages, |label| {
             let mut one = options.clone();
             one.input.label = Some(Label::One(label));
             one.save = volume::named(&path, label);
-            run(one, messages)?;
-        }
-        return Ok(());
+            run(one, messages)
+        });
     }
     let format = extension(&path);
     let is_mesh = MESHES.contains(&&*format);

@@ -199,16 +199,12 @@ pub(super) fn flat_interface(
             }
         });
         let correction = PartialPivLu::new(matrix.as_ref()).solve(&residual);
-        let mut largest = 0.0_f64;
         for i in 0..planes {
             w[i] += correction[i];
-            largest = largest.max(correction[i].abs());
         }
         speed += correction[planes];
-        if !largest.is_finite() {
-            break;
-        }
-        if largest < CONVERGED {
+        // Not for what is not a number.
+        if correction.iter().take(planes).all(|c| c.abs() < CONVERGED) {
             return Ok(w);
         }
     }

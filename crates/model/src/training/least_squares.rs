@@ -274,7 +274,10 @@ fn with_offsets(data: &SphereData, kernel: &[f64]) -> Vec<(Vec<f64>, f64)> {
 
 /// The heat kernel; where the given width cuts off so much of it that its variance falls short by more than one percent, a wider
 /// Gaussian that has the variance `2 tautilde` per axis after the cut. The variance is what moves nearly flat interfaces.
-pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
+///
+/// # Errors
+/// [`Error::Training`] if the kernel is too narrow for that.
+pub fn kernel_of_full_variance(data: &SphereData) -> Result<Vec<f64>, Error> {
     const SHORT: f64 = 0.01;
     let wanted = 2.0 * data.ratios.step_over_h2;
     let kernel_for = |step_over_h2: f64| {
@@ -291,8 +294,9 @@ pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
             * per_length
     };
     let kernel = kernel_for(data.ratios.step_over_h2);
-    if variance(&kernel) > (1.0 - SHORT) * wanted {
-        return kernel;
+    let holds = |kernel: &[f64]| variance(kernel) > (1.0 - SHORT) * wanted;
+    if holds(&kernel) {
+        return Ok(kernel);
     }
     let (mut low, mut high) = (data.ratios.step_over_h2, 4.0 * data.ratios.step_over_h2);
     for _ in 0..60 {
@@ -303,7 +307,17 @@ pub fn kernel_of_full_variance(data: &SphereData) -> Vec<f64> {
             high = middle;
         }
     }
-    kernel_for(0.5 * (low + high))
+    let widest = kernel_for(0.5 * (low + high));
+    if !holds(&widest) {
+        return Err(Error::Training(format!(
+            "a kernel of width {} is too narrow for steps of {} h^2: its variance stays at {:.3} h^2 where {wanted} h^2 is wanted; choose a \
+             wider one or shorter steps",
+            data.ratios.width,
+            data.ratios.step_over_h2,
+            variance(&widest)
+        )));
+    }
+    Ok(widest)
 }
 
 impl LeastSquaresParams {
@@ -333,7 +347,7 @@ impl Recipe for LeastSquaresParams {
         device: &ComputeDevice,
         observer: &mut Observer<'_, ()>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
-        let kernel = kernel_of_full_variance(data);
+        let kernel = kernel_of_full_variance(data)?;
         let polynomial = fit(data, self, &kernel, seed)?;
         let target = |z: f64| polynomial.jet(z)[0];
         let activation = distill_odd(&target, &self.distillation, seed, device, observer)?;
@@ -421,14 +435,17 @@ mod tests {
     #[test]
     fn narrow_kernels_keep_the_variance() {
         let wide = data();
-        assert_eq!(kernel_of_full_variance(&wide), heat_kernel(wide.ratios));
+        assert_eq!(
+            kernel_of_full_variance(&wide).unwrap(),
+            heat_kernel(wide.ratios)
+        );
         let ratios = Ratios {
             eps_over_h: 4.0,
             step_over_h2: 4.0,
             ..wide.ratios
         };
         let narrow = SphereData::new(ratios, 256).unwrap();
-        let kernel = kernel_of_full_variance(&narrow);
+        let kernel = kernel_of_full_variance(&narrow).unwrap();
         let h = narrow.spacing();
         let variance: f64 = (with_offsets(&narrow, &kernel).iter())
             .map(|(b, k)| k * b[0] * b[0] / (h * h))

@@ -510,8 +510,9 @@ impl Recipe for LmParams {
             Some(state) => state,
             None => self.start(data, &heat, seed, device)?,
         };
-        let (count, found) = (n + activation_len, state.parameters.len());
-        Error::check_count("training checkpoint", count, found)?;
+        for found in [&state.parameters, &state.best] {
+            Error::check_count("training checkpoint", n + activation_len, found.len())?;
+        }
         while state.iteration < self.iterations
             && state.iteration <= state.improved_at + self.patience
         {

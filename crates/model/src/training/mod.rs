@@ -28,9 +28,9 @@ pub struct Progress {
     pub iteration: usize,
     /// Number of planned iterations.
     pub of: usize,
-    /// Loss (eq:mcf_scheme_optimization_discrete) on the training data.
+    /// Loss (eq:mcf_scheme_optimization_discrete) on the training data; of a perceptron that imitates a function its residual.
     pub training_loss: f64,
-    /// Loss on held-out data.
+    /// The same on held-out data, if there are any.
     pub held_out_loss: f64,
 }
 

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use operators::ComputeDevice;
+use burn::tensor::DType;
+use operators::{ComputeDevice, memory};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -96,12 +97,16 @@ impl Trained {
 
 impl<R: Recipe> Training<'_, R> {
     /// Trains on from a checkpoint, keeps it up to date, and measures the result.
+    ///
+    /// # Errors
+    /// [`Error::Training`] without double precision or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
     pub fn run(
         &self,
         checkpoint: &mut Checkpoint<R::State>,
         device: &ComputeDevice,
         observer: &mut Observer<'_, Checkpoint<R::State>>,
     ) -> Result<Trained, Error> {
+        self.check(device)?;
         let state = checkpoint.state.clone();
         if state.is_none() {
             checkpoint.curve.clear();
@@ -140,6 +145,28 @@ impl<R: Recipe> Training<'_, R> {
             curve,
             quality,
         })
+    }
+
+    /// Refuses what would fail after the training.
+    fn check(&self, device: &ComputeDevice) -> Result<(), Error> {
+        /// Vectors of the grid in memory while the quality is measured.
+        const VECTORS: f64 = 10.0;
+        if device.dtype() != DType::F64 {
+            return Err(Error::Training(format!(
+                "training needs double precision, which {} does not have here: choose flex or ndarray",
+                device.kind().name()
+            )));
+        }
+        let nodes = (self.data.cells as f64).powi(self.data.ratios.dimension as i32);
+        let gigabytes = 1e-9 * 8.0 * VECTORS * nodes;
+        match memory::available().map(|bytes| 1e-9 * bytes) {
+            Some(available) if gigabytes > available => Err(Error::Training(format!(
+                "a grid of {} cells a side takes about {gigabytes:.1} GB of memory to measure the network on, and {available:.1} GB are \
+                 available: choose narrower interfaces",
+                self.data.cells
+            ))),
+            _ => Ok(()),
+        }
     }
 }
 

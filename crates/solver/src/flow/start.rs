@@ -40,7 +40,7 @@ impl<const D: usize> WillmoreFlow<D> {
     ///
     /// # Errors
     /// [`Error::Geometry`] if its grid is not the half of this one, or for another `eps` or `tautilde`.
-    pub fn begin_on(&mut self, mut half: Self) -> Result<(), Error> {
+    pub fn begin_on(&mut self, half: Self) -> Result<(), Error> {
         self.needs_grid("starts on half grids")?;
         half.needs_grid("starts on half grids")?;
         // The other grid's size and place are in the error.
@@ -59,10 +59,20 @@ impl<const D: usize> WillmoreFlow<D> {
                 other.to_bits() == own.to_bits()
             })?;
         }
-        if let Some(region) = &self.region {
-            half.restrict_to(&every_other_node(self.grid, &region.marks))?;
-        }
         self.half = Some(Box::new(half));
+        let marks = self.region.as_ref().map(|region| region.marks.clone());
+        marks.map_or(Ok(()), |marks| self.restrict_half(&marks))
+    }
+
+    /// Restricts the flow on the half grid to a region's nodes there; where it has none, steps do not begin there.
+    pub(super) fn restrict_half(&mut self, nodes: &[bool]) -> Result<(), Error> {
+        if let Some(mut half) = self.half.take() {
+            let coarser = every_other_node(self.grid, nodes);
+            if coarser.contains(&true) {
+                half.restrict_to(&coarser)?;
+                self.half = Some(half);
+            }
+        }
         Ok(())
     }
 
@@ -190,7 +200,7 @@ impl<const D: usize> WillmoreFlow<D> {
 }
 
 /// The marks at the nodes of the half grid.
-pub(super) fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &[bool]) -> Vec<bool> {
+fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &[bool]) -> Vec<bool> {
     let marks = nodes.iter().enumerate().filter(|(i, _)| {
         grid.multi_index(*i)
             .iter()

@@ -3,7 +3,7 @@
 //! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups,
 //! and tells no line numbers; `obj` reads single precision.
 
-use super::{FormatError, Polygons, level, position};
+use super::{FormatError, Polygons, level, position, side_of};
 use crate::TriangleMesh;
 use crate::vector::Vector;
 
@@ -11,8 +11,7 @@ use crate::vector::Vector;
 #[derive(Default)]
 struct Statements {
     vertices: Vec<[f64; 3]>,
-    /// Number of normals.
-    normals: usize,
+    normals: Vec<Vector>,
     /// All corners of faces in a row: the vertex, counted from one, and the normal, counted from zero, that it refers to.
     corners: Vec<(i64, Option<usize>)>,
     /// Where each face ends.
@@ -29,7 +28,11 @@ impl Statements {
             let vertices = found.vertices.len();
             match words.next() {
                 Some("v") => (found.vertices).push(position(words, number + 1, vertices)?),
-                Some("vn") => found.normals += 1,
+                Some("vn") => {
+                    let mut numbers = words.map(|word| word.parse().unwrap_or(0.0));
+                    let normal = std::array::from_fn(|_| numbers.next().unwrap_or(0.0));
+                    found.normals.push(Vector::from_array(normal));
+                }
                 Some("f") => {
                     for word in words {
                         let vertex = corner(word, number + 1, vertices)?;
@@ -49,10 +52,37 @@ impl Statements {
         (starts.zip(&self.ends)).map(|(&start, &end)| &self.corners[start..end])
     }
 
+    /// For every normal twice the vector area of the faces that refer to it, each as often as its corners do, with the vertices at these places.
+    fn normal_areas(&self, vertices: &[[f64; 3]]) -> Vec<Vector> {
+        let mut sums = vec![Vector::ZERO; self.normals.len()];
+        for face in self.faces() {
+            let place = |&(vertex, _): &(i64, Option<usize>)| {
+                let position = vertices.get((vertex - 1) as usize);
+                Vector::from_array(position.copied().unwrap_or_default())
+            };
+            // From a corner: far from the origin products of places lose all digits.
+            let first = face.first().map_or(Vector::ZERO, place);
+            let next = face.iter().cycle().skip(1);
+            let area: Vector = (face.iter().zip(next))
+                .map(|(a, b)| (place(a) - first).cross(place(b) - first))
+                .sum();
+            for normal in face.iter().filter_map(|(_, normal)| *normal) {
+                if let Some(sum) = sums.get_mut(normal) {
+                    *sum += area;
+                }
+            }
+        }
+        sums
+    }
+
     /// The normal of a corner `v//vn` or `v/vt/vn`; negative ones count backwards from the last normal so far.
     fn normal(&self, word: &str) -> Option<usize> {
         let normal: i64 = word.split('/').nth(2)?.parse().ok()?;
-        let first = if normal < 0 { self.normals as i64 } else { -1 };
+        let first = if normal < 0 {
+            self.normals.len() as i64
+        } else {
+            -1
+        };
         usize::try_from(first.checked_add(normal)?).ok()
     }
 }
@@ -77,14 +107,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
 /// The colours behind the coordinates of the vertices, if all have some.
 pub(super) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
     let text = String::from_utf8_lossy(bytes);
-    let vertices = text
-        .lines()
-        .filter_map(|line| line.trim_start().strip_prefix("v "));
-    let colour = |vertex: &str| {
-        let numbers: Option<Vec<f64>> = vertex
-            .split_whitespace()
-            .map(|word| word.parse().ok())
-            .collect();
+    let vertices = text.lines().filter_map(|line| {
+        let mut words = line.split_whitespace();
+        (words.next() == Some("v")).then_some(words)
+    });
+    let colour = |words: std::str::SplitWhitespace<'_>| {
+        let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
         match numbers?[..] {
             [_, _, _, r, g, b] => Some([r, g, b].map(level)),
             _ => None,
@@ -136,27 +164,20 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
 }
 
 /// For every normal in the text the unit normal of the corners that refer to it, which tells flat faces from smooth ones; none where no face
-/// with an area does.
+/// with an area does. They point to the side to which most of the old ones do, whichever way the faces wind.
 fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Option<[f64; 3]>>, FormatError> {
     let found = Statements::of(bytes)?;
-    let mut sums = vec![Vector::ZERO; found.normals];
-    for face in found.faces() {
-        let place = |&(vertex, _): &(i64, Option<usize>)| {
-            let position = moved.vertices.get((vertex - 1) as usize);
-            Vector::from_array(position.copied().unwrap_or_default())
-        };
-        // Twice the vector area, from a corner: far from the origin products of places lose all digits.
-        let first = face.first().map_or(Vector::ZERO, place);
-        let next = face.iter().cycle().skip(1);
-        let area: Vector = (face.iter().zip(next))
-            .map(|(a, b)| (place(a) - first).cross(place(b) - first))
-            .sum();
-        for normal in face.iter().filter_map(|(_, normal)| *normal) {
-            if let Some(sum) = sums.get_mut(normal) {
-                *sum += area;
-            }
-        }
-    }
-    let unit = |sum: Vector| Some(sum.try_normalize()?.to_array());
-    Ok(sums.into_iter().map(unit).collect())
+    let side = side_of(
+        found
+            .normal_areas(&found.vertices)
+            .into_iter()
+            .zip(found.normals.iter().copied()),
+    );
+    // Without the sign of zero.
+    let unit = |sum: Vector| Some((side * sum.try_normalize()? + Vector::ZERO).to_array());
+    Ok(found
+        .normal_areas(&moved.vertices)
+        .into_iter()
+        .map(unit)
+        .collect())
 }

@@ -6,8 +6,9 @@ mod header;
 use body::Body;
 use header::{Element, Header};
 
-use super::{FormatError, Polygons, finite, level};
+use super::{FormatError, Polygons, finite, level, side_of};
 use crate::TriangleMesh;
+use crate::vector::Vector;
 
 /// Elements that hold faces: polygons, and strips of triangles.
 const FACES: [&str; 2] = ["face", STRIPS];
@@ -136,7 +137,14 @@ pub(super) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 3]>>, FormatError>
 pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
     let header = Header::parse(bytes)?;
     let (element, mut body) = vertices(&header, bytes)?;
-    let normals = moved.vertex_normals();
+    let mut normals = moved.vertex_normals();
+    let old = decode(bytes)?;
+    let fitting = old.vertex_normals().into_iter().map(Vector::from_array);
+    let old = old.normals.into_iter().flatten().map(Vector::from_array);
+    let side = side_of(fitting.zip(old));
+    for normal in &mut normals {
+        *normal = normal.map(|x| side * x);
+    }
     let new = [
         (["x", "y", "z"], &moved.vertices),
         (["nx", "ny", "nz"], &normals),
