@@ -6,9 +6,7 @@ use surfaces::Fairing;
 use crate::prelude::*;
 use crate::surfaces::raster;
 
-/// Factors of Taubin's smoothing,
-pub const TAUBIN: [f64; 2] = [0.5, -0.53];
-/// and of Laplacian smoothing.
+/// Factors of Laplacian smoothing.
 pub const LAPLACIAN: [f64; 2] = [0.5, 0.0];
 
 /// Root of the mean square distance of the vertices of a mesh to a shape.

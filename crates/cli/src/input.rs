@@ -555,7 +555,7 @@ impl<'a> Reader<'a> {
         }
         let field = self.mesh_field(&body.surface, grid)?;
         let voxels = Some(Voxels {
-            volume: body.volume,
+            volume: body.surface.volume(),
             side: body.voxel,
             farthest: None,
             time: None,

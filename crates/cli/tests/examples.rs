@@ -60,7 +60,6 @@ fn inputs(folder: &Path) {
     for x in scan.vertices.iter_mut().flatten() {
         *x *= 10.0 / side;
     }
-    scan.normals = Some(scan.vertex_normals());
     scan.roughen(0.05, 3);
     let ball = |voxel: usize, x: f64, radius: f64| {
         let index = [voxel % 40, voxel / 40 % 24, voxel / (40 * 24)].map(|i| i as f64);

@@ -4,12 +4,12 @@ use geometry::{PhaseField, Placement, distances_from_phase_field, is_thin};
 use rayon::prelude::*;
 
 use crate::level_set::project;
+use crate::smoothing::TAUBIN;
 use crate::vector::Vector;
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
-/// Most rounds of Taubin's smoothing before the flow, and their factors.
+/// Most rounds of Taubin's smoothing before the flow.
 const ROUNDS: usize = 30;
-const TAUBIN: [f64; 2] = [0.5, -0.53];
 /// The flow takes at most the time `100 s^2 (e^2 + h^2)` for noise of standard deviation `s` on a mesh with edges of mean length `e` and a
 /// grid of spacing `h`. Where there is a shape to be lost, the displacement ends it before; a noisy sphere becomes a sphere in this time.
 const TIME: f64 = 100.0;

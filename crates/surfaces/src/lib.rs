@@ -89,4 +89,5 @@ pub use read::{decode, read, rewrite, vertex_colours};
 pub use remeshing::remeshed_surface;
 pub use repair::{Repaired, repair};
 pub use signs::mend_signs;
+pub use smoothing::TAUBIN;
 pub use write::{encode, write};

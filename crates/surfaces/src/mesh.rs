@@ -64,14 +64,27 @@ impl TriangleMesh {
         sides.filter(|(_, _, area)| *area > 0.0)
     }
 
-    /// Moves every vertex along its normal by a random length of up to `noise`, as a scanner errs. The normals are dropped: they are
-    /// no longer those of the surface. A mesh without normals stays as it is.
+    /// Moves every vertex along its normal by a random length of up to `noise`, as a scanner errs; those at the same place move alike, so that
+    /// seams stay closed. Normals that the mesh has are dropped: they are no longer those of the surface.
     pub fn roughen(&mut self, noise: f64, seed: u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let normals = self.normals.take().unwrap_or_default();
+        let (first, index) = merge_coincident(&self.vertices);
+        let same = |vertex: u32| first[index[vertex as usize] as usize];
+        let faces = self.faces.iter().map(|face| face.map(|v| same(v) as u32));
+        let welded = Self {
+            vertices: self.vertices.clone(),
+            faces: faces.collect(),
+            normals: None,
+        };
+        let normals = self.normals.take();
+        let normals = normals.unwrap_or_else(|| welded.vertex_normals());
         for (x, normal) in self.vertices.iter_mut().zip(&normals) {
             let length = noise * rng.random_range(-1.0..=1.0);
             *x = std::array::from_fn(|i| length.mul_add(normal[i], x[i]));
+        }
+        let moved = self.vertices.clone();
+        for (x, &place) in self.vertices.iter_mut().zip(&index) {
+            *x = moved[first[place as usize]];
         }
     }
 

@@ -8,7 +8,9 @@ const AVERAGING: usize = 12;
 /// and the root of the median of these means over that of the mean, of independent normally distributed numbers at regular vertices.
 const MEDIAN_OF_MEANS: f64 = 0.99;
 
-/// Factors of Taubin's smoothing of fields on a mesh.
+/// The usual factors of Taubin's smoothing of a mesh.
+pub const TAUBIN: [f64; 2] = [0.5, -0.53];
+/// Those of fields on a mesh.
 const FACTORS: [f64; 2] = [0.5, -0.47];
 
 /// The neighbours of every vertex along edges, in ascending order.
@@ -204,7 +206,7 @@ impl TriangleMesh {
     pub fn noise(&self) -> f64 {
         let umbrellas = Umbrellas::of(self);
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
-        let normals = self.smoothed(12, 0.5, -0.53).vertex_normals();
+        let normals = self.smoothed(12, TAUBIN[0], TAUBIN[1]).vertex_normals();
         let found = self.squared_noise(&umbrellas, &normals);
         // A number at each vertex, as a vector.
         let mut squares: Vec<Vector> = (found.iter())

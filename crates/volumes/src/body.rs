@@ -43,10 +43,8 @@ impl Inside {
 /// What is inside, in the coordinates of the volume.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Its surface.
+    /// Its surface, around the volume of its voxels without the specks, or through where values pass the threshold.
     pub surface: ClosedMesh,
-    /// Its volume: that of its voxels without the specks, or for a threshold that inside the surface.
-    pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub voxel: f64,
     /// How many parts and holes are left out,
@@ -102,10 +100,8 @@ impl Volume {
         let cell = self.voxel_volume();
         let voxel = cell.cbrt();
         let Inside::Label(_) = inside else {
-            let surface = ClosedMesh::new(self.placed(lattice.mesh()))?.0;
             return Ok(Body {
-                volume: surface.volume(),
-                surface,
+                surface: ClosedMesh::new(self.placed(lattice.mesh()))?.0,
                 voxel,
                 specks: 0,
                 filled: 0,
@@ -113,10 +109,8 @@ impl Volume {
         };
         let large = lattice.without_small_parts(SPECK)?;
         let voxels = self.voxels_within(large.mesh(), inside);
-        let surface = self.without_steps(large.mesh(), voxels * cell)?;
         Ok(Body {
-            volume: surface.volume(),
-            surface,
+            surface: self.without_steps(large.mesh(), voxels * cell)?,
             voxel,
             specks: lattice.components() - large.components(),
             filled: voxels as isize - part.count as isize,

@@ -26,8 +26,8 @@
 //!     }
 //!     let body = volume.body(Inside::Label(3.0))?;
 //!     let area = body.surface.area(); // 4 pi 8^2 = 804.2
-//!     println!("volume {:.1}, area {area:.0}", body.volume); // 4/3 pi 8^3 = 2144.7
-//! #   assert_eq!(format!("{:.1}, {area:.0}", body.volume), "2208.0, 825");
+//!     println!("volume {:.1}, area {area:.0}", body.surface.volume()); // 4/3 pi 8^3 = 2144.7
+//! #   assert_eq!(format!("{:.1}, {area:.0}", body.surface.volume()), "2208.0, 825");
 //!     Ok(())
 //! }
 //! ```

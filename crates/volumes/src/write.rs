@@ -12,7 +12,7 @@ use crate::{Error, Volume};
 const HEADER: usize = 348;
 const START: usize = 352;
 
-/// Writes labels of 0 to 255 as NIfTI-1, atomically; a name that ends in `.gz` compresses them. Other values are rounded.
+/// Writes labels of 0 to 255 as NIfTI-1, atomically; a name that ends in `.gz` compresses them. Other values go to the nearest label.
 ///
 /// # Errors
 /// [`Error::UnknownFormat`] for a name that ends in neither `.nii` nor `.nii.gz`, [`Error::Io`].

@@ -24,7 +24,7 @@ fn check(_: &[u8], volume: Volume) {
     let label = volume.labels().map(|labels| Inside::Label(labels[0].0));
     for inside in label.into_iter().chain([Inside::Above(0.5 * (low + high))]) {
         match volume.body(inside) {
-            Ok(body) => assert!(body.volume > 0.0),
+            Ok(body) => assert!(body.surface.volume() > 0.0),
             Err(error) => fuzzing::assert_short_line(&error),
         }
     }

@@ -4,8 +4,9 @@ use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
+use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
 use crate::surfaces::centred_box;
+use ::surfaces::TAUBIN;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
 use surfaces::{Fairing, samples, usual_up_axis};

@@ -3,7 +3,8 @@
 use chacha20::ChaCha8Rng;
 
 use crate::prelude::*;
-use crate::smoothing::{LAPLACIAN, TAUBIN, fairing_flow, mesh_raster, rms_distance};
+use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
+use ::surfaces::TAUBIN;
 use rand::{RngExt, SeedableRng};
 use surfaces::samples;
 use volumes::{Body, Inside, Volume};
@@ -149,7 +150,7 @@ impl Segmented {
                 let mut surface = start.mesh().clone();
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
-                    case.held.volume = keeps.then_some(Target::keep(self.body.volume));
+                    case.held.volume = keeps.then_some(Target::keep(self.body.surface.volume()));
                     let run = stage.run(case.clone())?;
                     u = run.stored().clone();
                     volume = ZeroSet::of(&u, case.scales.eps)?.volume;
@@ -188,7 +189,7 @@ impl Segmented {
 impl Row<'_> {
     /// Of the volume of the voxels, in percent.
     fn change(&self) -> f64 {
-        100.0 * (self.volume / self.of.body.volume - 1.0)
+        100.0 * (self.volume / self.of.body.surface.volume() - 1.0)
     }
 
     fn distance(&self) -> f64 {

@@ -1,10 +1,7 @@
-use std::collections::HashMap;
-
 use volumes::Volume;
 
 use crate::cli::{MessageOptions, SampleOptions};
 use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
-use crate::keep::key;
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -57,7 +54,9 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
             surfaces::read(from)?
         };
         if noise > 0.0 {
-            roughen(&mut mesh, noise, options.seed);
+            // Those in the file may not be outward.
+            mesh.normals = None;
+            mesh.roughen(noise, options.seed);
         }
         surfaces::write(&path, &mesh)?;
     } else {
@@ -75,23 +74,6 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     let outcome = json!({ "command": "sample", "file": path });
     messages.report(&outcome, &format!("wrote {shown}"));
     Ok(())
-}
-
-/// Moves vertices along their normals, and those at the same place alike, so that seams stay closed.
-fn roughen(mesh: &mut TriangleMesh, noise: f64, seed: u64) {
-    let mut first_at = HashMap::new();
-    let places = mesh.vertices.iter().zip(0..);
-    let first: Vec<u32> = places
-        .map(|(x, vertex)| *first_at.entry(key(*x)).or_insert(vertex))
-        .collect();
-    let mut rough = mesh.clone();
-    for face in &mut rough.faces {
-        *face = face.map(|vertex| first[vertex as usize]);
-    }
-    rough.normals = Some(rough.vertex_normals());
-    rough.roughen(noise, seed);
-    mesh.vertices = (first.iter().map(|&vertex| rough.vertices[vertex as usize])).collect();
-    mesh.normals = None;
 }
 
 fn eps<const D: usize>(u: &Field<D>) -> f64 {
