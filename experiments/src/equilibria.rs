@@ -198,16 +198,16 @@ impl<const D: usize> AtRest<D> {
 
 /// Energies in units of that of the ball of the same perimeter or, in space, of any ball, `8 pi`; drifts, multipliers and work.
 pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
-    let (energy, sizes) = match D {
-        2 => ("w_over_circle", ["length", "area"]),
-        _ => ("w_over_8pi", ["area", "volume"]),
+    let (energy, head, sizes) = match D {
+        2 => ("w_over_circle", "energy / circle's", ["length", "area"]),
+        _ => ("w_over_8pi", "energy / ball's", ["area", "volume"]),
     };
     let error = |one: &AtRest<D>| one.zero_set.willmore_energy / one.equilibrium.energy - 1.0;
     let (energies, forces) = (Fixed(4), Fixed(3));
     let mut sheet = Sheet::of(all)
         .keyed(|one, name| format!("{}.{name}", one.equilibrium.key))
         .text("equilibrium", |one| one.equilibrium.title.as_str())
-        .measure(energy, ("energy / ball's", energies), AtRest::energy)
+        .measure(energy, (head, energies), AtRest::energy)
         .measure("exact", ("exact energy", energies), AtRest::exact_energy)
         .column("error in %", Fixed(2), |one| 100.0 * error(one));
     for (k, name) in sizes.into_iter().enumerate() {

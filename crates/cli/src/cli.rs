@@ -140,8 +140,8 @@ pub struct InputOptions {
     #[arg(long, value_name = "LENGTH")]
     pub box_side: Option<f64>,
 
-    /// Longest side of the shape in the box, which is made around a mesh, image or volume in its own units [default: 0.6 of the box, for `fair`
-    /// of a mesh 0.8 or 0.9]
+    /// Longest side of the shape in units of --box-side; the box is scaled to meshes, images and volumes, so that all other lengths are in
+    /// the units of the input [default: 0.6 of the box, for `fair` of a mesh 0.8 or 0.9]
     #[arg(long, value_name = "LENGTH")]
     pub side_length: Option<f64>,
 
@@ -307,8 +307,8 @@ pub struct RunOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct FlowOptions {
-    /// Time steps: controlled (of second order, by their error), auto (by the energy), auto:FIRST, VALUE, doubling:FIRST,
-    /// graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
+    /// Time steps, in lengths of the input to the fourth power: controlled (of second order, by their error), auto (by the energy),
+    /// auto:FIRST, VALUE, doubling:FIRST, graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
     /// step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled
     /// where only --steps or --time end it]
     #[arg(long, value_name = "TAU")]
@@ -419,7 +419,7 @@ pub struct InpaintOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct McfOptions {
-    /// By which step
+    /// The step of mean curvature flow
     #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
     pub method: Method,
 
@@ -499,7 +499,7 @@ pub struct CheckOptions {
 
 #[derive(Args, Clone, Debug)]
 pub struct TrainOptions {
-    /// Of space: 2 or 3
+    /// Dimension of space, 2 or 3; it must be given, as --width, --eps-over-h and --save
     #[arg(long, value_name = "D")]
     pub dimension: Option<usize>,
 

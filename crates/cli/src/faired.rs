@@ -105,7 +105,8 @@ pub fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Val
 /// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
 /// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
 pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -> Result<Figure> {
-    let largest = lengths.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    // Also where all of them are zero there is a range of lengths.
+    let largest = lengths.iter().copied().fold(1e-100, f64::max);
     let colours = lengths.iter().zip(lost);
     let colours = colours.map(|(length, lost)| {
         if *lost {

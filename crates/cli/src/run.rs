@@ -123,10 +123,14 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             self.messages.warn(gone);
         }
         if self.options.frames.is_some() {
-            let (pictures, series) = frames(directory.path(), run.records())?;
+            let (pictures, series) = frames(directory.path(), run.records());
             // There are none of a shape that is never there.
             if !pictures.is_empty() {
-                let animation = render::animation(&pictures)?;
+                let frame = |index: usize| -> Result<Picture> {
+                    let picture = &pictures[index];
+                    Ok(images::colours(picture, &read(picture)?)?)
+                };
+                let animation = render::animation(pictures.len(), frame)?;
                 directory.write_file(presentation::ANIMATION, &animation)?;
                 directory.write_file(presentation::SERIES, series.as_bytes())?;
             }
@@ -355,8 +359,8 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
     }))
 }
 
-/// The pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.
-fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String)> {
+/// The files of the pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.
+fn frames(run: &Path, records: &[Record]) -> (Vec<PathBuf>, String) {
     let mut pictures = Vec::new();
     let mut series =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n"
@@ -367,12 +371,12 @@ fn frames(run: &Path, records: &[Record]) -> Result<(Vec<Picture>, String)> {
         let name = presentation::frame(step);
         let picture = run.join(format!("{name}.png"));
         if picture.exists() {
-            pictures.push(images::colours(&picture, &read(&picture)?)?);
+            pictures.push(picture);
             let _ = writeln!(
                 series,
                 "    <DataSet timestep=\"{time}\" file=\"{name}.vti\"/>"
             );
         }
     }
-    Ok((pictures, series + "  </Collection>\n</VTKFile>\n"))
+    (pictures, series + "  </Collection>\n</VTKFile>\n")
 }

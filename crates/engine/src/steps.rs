@@ -307,7 +307,7 @@ impl FromStr for StepRule {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        const RULES: &str = "auto, auto:FIRST, controlled, VALUE, doubling:FIRST, graded:VALUE,PART, growing:VALUE,ALIKE or \
+        const RULES: &str = "auto, auto:FIRST, controlled, VALUE, doubling:FIRST, graded:FIRST,PART, growing:VALUE,COUNT or \
              ramp:VALUE,HALVINGS";
         let positive = |text: &str| match text.trim().parse::<f64>() {
             Ok(value) if value.is_finite() && value > 0.0 => Ok(value),

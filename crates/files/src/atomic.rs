@@ -37,7 +37,7 @@ pub fn write_atomically_on(
     let path = path.as_ref();
     let failed = |action| Error::of(action, path);
     let folder = folder_of(path);
-    let (file, temporary) = tempfile::Builder::new()
+    let (file, mut temporary) = tempfile::Builder::new()
         .prefix(TEMPORARY_PREFIX)
         .make_in(folder, |path| storage.create_file(path))
         .map_err(failed("create a file beside"))?
@@ -63,12 +63,12 @@ pub fn write_atomically_on(
     };
     let stored = store();
     // By hand, so that the storage knows. Only a panic above leaves it to the destructor.
-    let kept = temporary.keep().map_err(|e| failed("replace")(e.error));
-    if let (Err(_), Ok(temporary)) = (&stored, &kept) {
+    temporary.disable_cleanup(true);
+    if stored.is_err() {
         // The first error is the one to report.
-        let _ = storage.remove(temporary);
+        let _ = storage.remove(&temporary);
     }
-    stored.and(kept)?;
+    stored?;
     (storage.sync_folder(folder)).map_err(failed("flush the folder of"))
 }
 

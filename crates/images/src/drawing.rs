@@ -19,7 +19,7 @@ const BAND: usize = 16;
 /// outline is found again in the picture by a threshold of 0.5.
 ///
 /// # Errors
-/// If the frame is too large, which it was checked not to be.
+/// If the frame is too large, as one that was stored may be.
 pub fn drawing(
     frame: &Frame,
     shape: &dyn SignedDistance<2>,
@@ -29,7 +29,7 @@ pub fn drawing(
     let paper = paper.map_or([0.0; 4], |Rgb(r, g, b)| {
         [r, g, b, 255].map(|v| f64::from(v) / 255.0)
     });
-    let [width, height] = frame.size().map(|side| side as usize);
+    let [width, height] = render::checked_size(frame.size())?.map(|side| side as usize);
     let mut pixels = vec![[0; 4]; width * height];
     let bands = pixels.par_chunks_mut(BAND * width).enumerate();
     bands.for_each(|(band, pixels)| {

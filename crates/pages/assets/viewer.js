@@ -32,7 +32,7 @@ void main() {
 }`;
 
 // The reverse of surface.rs.
-function decodeSurface(block) {
+function decodeSurface(block, centre) {
   const text = atob(block.textContent);
   const bytes = Uint8Array.from(text, (c) => c.charCodeAt(0));
   const numbers = (list) => list.split(" ").map(Number);
@@ -40,7 +40,8 @@ function decodeSurface(block) {
   const [origin, unit] = [numbers(low), numbers(step)];
   const positions = new Float32Array(3 * Number(vertices));
   for (let k = 0; k < positions.length; k++) {
-    positions[k] = origin[k % 3] + unit[k % 3] * (bytes[2 * k] | (bytes[2 * k + 1] << 8));
+    // Relative to the centre: far from the origin single precision would not do.
+    positions[k] = origin[k % 3] - centre[k % 3] + unit[k % 3] * (bytes[2 * k] | (bytes[2 * k + 1] << 8));
   }
   let at = 2 * positions.length;
   const given = "normals" in block.dataset;
@@ -89,8 +90,6 @@ function smoothNormals(positions, corners) {
   }
   return normals;
 }
-
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 class SurfaceViewer {
   constructor(figure) {
@@ -186,7 +185,7 @@ class SurfaceViewer {
     if (!gl) return;
     this.step = k;
     if (!this.surfaces.has(k)) {
-      const { positions, normals, corners } = decodeSurface(this.blocks[k]);
+      const { positions, normals, corners } = decodeSurface(this.blocks[k], this.ball.centre);
       const buffer = (target, data) => {
         const made = gl.createBuffer();
         gl.bindBuffer(target, made);
@@ -241,8 +240,7 @@ class SurfaceViewer {
     const shorter = Math.min(width, height);
     const [fx, fy] = [(focal * shorter) / width, (focal * shorter) / height];
     const depth = [(far + near) / (far - near), (-2 * far * near) / (far - near)];
-    const row = (direction, scale) =>
-      [...direction, -dot(direction, ball.centre)].map((v) => (scale * v) / ball.radius);
+    const row = (direction, scale) => [...direction, 0].map((v) => (scale * v) / ball.radius);
     const [x, y, z] = [row(right, fx), row(above, fy), row(toward, -1)];
     z[3] += distance; // Now the distance in front of the eye.
     const rows = [x, y, z.map((v, i) => depth[0] * v + (i === 3 ? depth[1] : 0)), z];

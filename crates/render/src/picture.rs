@@ -67,7 +67,25 @@ impl Picture {
     /// # Errors
     /// [`Error::Encode`].
     pub fn to_png(&self) -> Result<Vec<u8>, Error> {
-        encode_png(std::slice::from_ref(self), false)
+        let (mut bytes, opaque) = (Vec::new(), self.is_opaque());
+        let mut writer = encoder(&mut bytes, self.size, opaque).write_header()?;
+        writer.write_image_data(&self.channels(opaque))?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
+    fn is_opaque(&self) -> bool {
+        self.pixels.iter().all(|pixel| pixel[3] == 255)
+    }
+
+    /// All of its numbers, without opacity if it is opaque.
+    fn channels(&self, opaque: bool) -> Vec<u8> {
+        let channels = if opaque { 3 } else { 4 };
+        let pixels = self.pixels.iter();
+        pixels
+            .flat_map(|pixel| &pixel[..channels])
+            .copied()
+            .collect()
     }
 
     /// Writes a PNG file, atomically (see [`write_atomically`]).
@@ -80,45 +98,52 @@ impl Picture {
     }
 }
 
-/// The bytes of an animated PNG file (APNG): pictures shown one after the other, for ever, five a
-/// second. Viewers that know no APNG show the first picture.
+/// The bytes of an animated PNG file (APNG): `count` pictures shown one after the other, for ever, five a
+/// second. Viewers that know no APNG show the first picture. Each is made twice, so that there is never more than one in memory.
 ///
 /// # Errors
-/// There must be a picture, and all must have one size; [`Error::Encode`].
-pub fn animation(frames: &[Picture]) -> Result<Vec<u8>, Error> {
-    let first = frames.first().ok_or(Error::NoFrames)?;
-    if let Some(index) = frames.iter().position(|frame| frame.size != first.size) {
-        return Err(Error::FrameSize {
-            index,
-            size: frames[index].size,
-            first: first.size,
-        });
+/// There must be a picture, and all must have one size; [`Error::Encode`], and the errors of `frame`.
+pub fn animation<E: From<Error>>(
+    count: usize,
+    frame: impl Fn(usize) -> Result<Picture, E>,
+) -> Result<Vec<u8>, E> {
+    let (mut first, mut opaque) = (None, true);
+    for index in 0..count {
+        let frame = frame(index)?;
+        let (size, first) = (frame.size, *first.get_or_insert(frame.size));
+        if size != first {
+            return Err(Error::FrameSize { index, size, first }.into());
+        }
+        opaque &= frame.is_opaque();
     }
-    encode_png(frames, true)
+    let size = first.ok_or(Error::NoFrames)?;
+    let mut bytes = Vec::new();
+    let failed = |error: png::EncodingError| Error::from(error);
+    let mut encoder = encoder(&mut bytes, size, opaque);
+    encoder.set_animated(count as u32, 0).map_err(failed)?;
+    encoder.set_frame_delay(DELAY, 1000).map_err(failed)?;
+    let mut writer = encoder.write_header().map_err(failed)?;
+    for index in 0..count {
+        let channels = frame(index)?.channels(opaque);
+        writer.write_image_data(&channels).map_err(failed)?;
+    }
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
 }
 
 /// A PNG file. Opaque pictures are stored without opacity.
-fn encode_png(frames: &[Picture], animated: bool) -> Result<Vec<u8>, Error> {
-    let mut pixels = frames.iter().flat_map(|frame| &frame.pixels);
-    let (colour, channels) = if pixels.all(|pixel| pixel[3] == 255) {
-        (png::ColorType::Rgb, 3)
+fn encoder(
+    bytes: &mut Vec<u8>,
+    [width, height]: [u32; 2],
+    opaque: bool,
+) -> png::Encoder<'_, &mut Vec<u8>> {
+    let mut encoder = png::Encoder::new(bytes, width, height);
+    encoder.set_color(if opaque {
+        png::ColorType::Rgb
     } else {
-        (png::ColorType::Rgba, 4)
-    };
-    let ([width, height], mut bytes) = (frames[0].size, Vec::new());
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(colour);
+        png::ColorType::Rgba
+    });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    if animated {
-        encoder.set_animated(frames.len() as u32, 0)?;
-        encoder.set_frame_delay(DELAY, 1000)?;
-    }
-    let mut writer = encoder.write_header()?;
-    for frame in frames {
-        let channels = frame.pixels.iter().flat_map(|pixel| &pixel[..channels]);
-        writer.write_image_data(&channels.copied().collect::<Vec<u8>>())?;
-    }
-    writer.finish()?;
-    Ok(bytes)
+    encoder
 }

@@ -156,6 +156,7 @@ impl Scene {
     /// A number out of range, nothing to frame, or a size that cannot be drawn.
     pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
         let size = checked_size(size)?;
+        self.mesh.check(f64::MAX)?;
         let mut model = Model::new(&self.mesh);
         let mut colours = vec![self.colour.linear()];
         for (index, tube) in self.tubes.iter().enumerate() {

@@ -459,7 +459,10 @@ fn files_hold_the_pictures() {
         picture.clone(),
         Picture::new([40, 30], vec![[7; 4]; 1200]).unwrap(),
     ];
-    let bytes = animation(&pictures).unwrap();
+    let animated = |pictures: &[Picture]| -> Result<Vec<u8>, Error> {
+        animation(pictures.len(), |index| Ok(pictures[index].clone()))
+    };
+    let bytes = animated(&pictures).unwrap();
     let (_, control, frames) = decoded(&bytes);
     let control = control.unwrap();
     assert_eq!((control.num_frames, control.num_plays), (2, 0));
@@ -467,8 +470,8 @@ fn files_hold_the_pictures() {
         assert_eq!(frame, picture.pixels().as_flattened());
     }
 
-    assert!(matches!(animation(&[]), Err(Error::NoFrames)));
-    let mixed = animation(&[picture, opaque]);
+    assert!(matches!(animated(&[]), Err(Error::NoFrames)));
+    let mixed = animated(&[picture, opaque]);
     assert!(matches!(mixed, Err(Error::FrameSize { index: 1, .. })));
     assert!(matches!(
         Picture::new([2, 2], vec![[0; 4]; 3]),

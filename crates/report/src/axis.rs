@@ -187,7 +187,7 @@ impl Ticks {
 }
 
 /// Ranges up to this width cannot be told from a point: their ticks would drown in rounding.
-fn narrowest(low: f64, high: f64) -> f64 {
+pub(crate) fn narrowest(low: f64, high: f64) -> f64 {
     1e-12 * low.abs().max(high.abs()) + 1e-280
 }
 

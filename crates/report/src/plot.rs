@@ -187,7 +187,11 @@ impl Drawable for Plot<'_> {
                 symbols.extend(placed.into_iter().filter(|&p| bounds.contains(p)));
             }
             if let Some(marker) = entry.marker {
-                surface.markers(marker, &thin(&symbols, 11.0), colour);
+                // Along a line some of them do.
+                if entry.style != LineStyle::None {
+                    symbols = thin(&symbols, 11.0);
+                }
+                surface.markers(marker, &symbols, colour);
             }
         }
         self.axes.draw_frame(surface, plot);

@@ -59,7 +59,12 @@ impl Cell {
     fn shown(&self, format: Option<Format>) -> String {
         match (self, format) {
             (Self::Missing, _) => "–".to_owned(),
-            (Self::Number(number), Some(Format::Fixed(decimals))) => format!("{number:.decimals$}"),
+            (Self::Number(number), Some(Format::Fixed(decimals))) => {
+                let text = format!("{number:.decimals$}");
+                // Without the sign of what is zero to these digits.
+                let is_zero = text.parse() == Ok(0.0);
+                (text.strip_prefix('-').filter(|_| is_zero)).map_or(text.clone(), str::to_owned)
+            }
             (Self::Number(number), Some(Format::Scientific(decimals))) => {
                 scientific(*number, decimals)
             }

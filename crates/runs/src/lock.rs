@@ -25,7 +25,10 @@ pub(crate) fn lock(storage: &dyn Storage, folder: &Path) -> Result<Lock, Error> 
     let path = folder.join(names::LOCK);
     let locked = || Error::Locked(folder.into());
     let file = if path.symlink_metadata().is_ok() {
-        digest::open(&path)?
+        let ordinary = digest::open(&path)?;
+        // Locks on network file systems take a file that is open for writing.
+        let writable = File::options().read(true).write(true).open(&path);
+        writable.unwrap_or(ordinary)
     } else {
         match storage.create_file(&path) {
             // Somebody else was faster.

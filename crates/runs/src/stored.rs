@@ -142,7 +142,8 @@ impl StoredRun {
         }
         // First the commit becomes the last one: after that, no checkpoint lists a file that is about to be removed.
         let checkpoints = self.run.path.join(names::CHECKPOINTS);
-        (self.run).remove(|path| path.starts_with(&checkpoints))?;
+        let is_commit = |path: &Path| names::step(&folder::name(&self.run.path, path)).is_some();
+        self.run.remove(is_commit)?;
         let flushed = self.run.storage.sync_folder(&checkpoints);
         flushed.map_err(files::Error::of("flush", checkpoints))?;
         self.run.remove(folder::is_temporary)

@@ -195,24 +195,32 @@ fn only_checkpoints_and_temporary_files_are_tidied_away() {
     run_to(&run, STEPS).unwrap();
     let expected = toy::all_contents(&run);
     let left = ["fields/.partial-Xy12", "checkpoints/step-00000057.ckpt"];
-    for name in left.iter().chain(&["fields/mine", "mine/.partial-x"]) {
+    let own = [
+        "fields/mine",
+        "mine/.partial-x",
+        "checkpoints/mine/step-1.ckpt",
+        "checkpoints/notes",
+    ];
+    for name in left.iter().chain(&own) {
         fs::create_dir_all(run.join(name).parent().unwrap()).unwrap();
         fs::write(run.join(name), "half").unwrap();
     }
     fs::create_dir(run.join(".partial-folder")).unwrap();
     let stored = RunDirectory::open(&run).unwrap();
-    assert_eq!(stored.leftovers().count(), 5);
+    assert_eq!(stored.leftovers().count(), 7);
     stored.tidy().unwrap();
     stored.tidy().unwrap();
     assert!(left.iter().all(|name| !run.join(name).exists()));
     assert!(run.join(".partial-folder").exists());
-    assert!(run.join("fields/mine").exists() && run.join("mine/.partial-x").exists());
+    assert!(own.iter().all(|name| run.join(name).exists()));
     drop(stored.resume().unwrap());
-    assert!(run.join("mine/.partial-x").exists());
-    for folder in ["mine", ".partial-folder"] {
+    assert!(own.iter().all(|name| run.join(name).exists()));
+    for folder in ["mine", ".partial-folder", "checkpoints/mine"] {
         fs::remove_dir_all(run.join(folder)).unwrap();
     }
-    fs::remove_file(run.join("fields/mine")).unwrap();
+    for file in ["fields/mine", "checkpoints/notes"] {
+        fs::remove_file(run.join(file)).unwrap();
+    }
     assert!(toy::all_contents(&run) == expected);
 }
 

@@ -7,6 +7,7 @@ use geometry::{npy, vti};
 
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
+/// `willmore` takes the file with `--holds distance`.
 #[derive(Parser, Debug)]
 #[command(name = "mesh_distance", version)]
 pub struct Options {

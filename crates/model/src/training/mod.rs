@@ -48,4 +48,4 @@ impl Progress {
 
 /// Called after every iteration of a training: `Ok(false)` stops it with [`Error::Interrupted`], and an error, such as that of storing
 /// a checkpoint, ends it.
-pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + 'a;
+pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + Send + 'a;

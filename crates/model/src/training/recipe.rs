@@ -11,9 +11,9 @@ use super::{Observer, Progress, SphereData};
 use crate::{Error, Mlp, Network, Provenance, Quality};
 
 /// A method of training with its settings.
-pub trait Recipe: Serialize {
+pub trait Recipe: Serialize + Sync {
     /// What the training needs to go on with the same bytes after an interruption; `()` for one that starts over.
-    type State: Clone + Serialize + DeserializeOwned;
+    type State: Clone + Send + Serialize + DeserializeOwned;
 
     /// Trains kernel and activation. The observer is called after every iteration and may stop the training.
     ///
@@ -123,8 +123,11 @@ impl<R: Recipe> Training<'_, R> {
             });
             observer(progress, checkpoint)
         };
-        let (kernel, activation) =
-            (self.recipe).train(&self.data, self.seed, state, device, &mut record)?;
+        // The order of sums in products of matrices depends on the number of threads: it is that of the shipped networks on every machine.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let pool = pool.map_err(|e| Error::Training(format!("cannot start threads: {e}")))?;
+        let train = || (self.recipe).train(&self.data, self.seed, state, device, &mut record);
+        let (kernel, activation) = pool.install(train)?;
         let curve = checkpoint.curve.clone();
         let provenance = Provenance {
             recipe: self.recipe.describe(&self.data, curve.len()),
@@ -210,5 +213,11 @@ mod tests {
         };
         assert_eq!(losses(&resumed), losses(&whole));
         assert!(resumed.curve.is_sorted_by_key(|point| point.seconds));
+        // Nor does it matter how many threads there are.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let alone = pool
+            .unwrap()
+            .install(|| run(&mut Checkpoint::default(), 100));
+        assert_eq!(alone.unwrap().network, whole.network);
     }
 }
