@@ -282,8 +282,8 @@ impl<const D: usize> WillmoreFlow<D> {
         })
     }
 
-    /// Lets only the values at these nodes move from now on, in the order of the grid; the others stay, bit for bit. The energy
-    /// is that of the whole field.
+    /// Lets only the values at these nodes move from now on, in the order of the grid; the others stay, bit for bit where they are stored.
+    /// The energy is that of the whole field.
     ///
     /// # Errors
     /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
@@ -496,6 +496,7 @@ impl<const D: usize> WillmoreFlow<D> {
         let mut record = self.record(tau, &minimum, energies, origin, clock);
         record.times.start = beginning;
         self.previous = Some((std::mem::replace(&mut self.current, minimum.u), tau));
+        self.rate = None;
         self.step += 1;
         self.time += tau;
         Ok(record)

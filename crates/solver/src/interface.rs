@@ -14,8 +14,10 @@
 //!
 //! [sparse]: crate::sparse
 
+use faer::dyn_stack::MemStack;
+use faer::linalg::cholesky::llt::solve::solve_in_place;
 use faer::linalg::solvers::Solve;
-use faer::{ColMut, Mat, Side};
+use faer::{ColMut, Mat, Par, Side};
 use geometry::{Nodes, parallel};
 use operators::{HostUpdate, Real};
 
@@ -158,7 +160,10 @@ fn dense_inverse([mut mass, stiffness, bent]: [Mat<f64>; 3], tau: f64) -> Option
     });
     let factor = matrix.llt(Side::Lower).ok()?;
     Some(Box::new(move |x| {
-        factor.solve_in_place(ColMut::from_slice_mut(x).as_mat_mut());
+        let x = ColMut::from_slice_mut(x).as_mat_mut();
+        // On any number of threads sums are divided as on two.
+        let threads = Par::rayon(2);
+        solve_in_place(factor.L(), x, threads, MemStack::new(&mut []));
     }))
 }
 
@@ -238,6 +243,31 @@ mod tests {
                 (1.0 - u[i] * u[i]) * (k * y.atan2(x)).cos()
             })
             .collect()
+    }
+
+    #[test]
+    fn the_inverse_does_not_depend_on_the_number_of_threads() {
+        const COLUMNS: usize = 900;
+        let matrix = |diagonal: f64| {
+            Mat::from_fn(COLUMNS, COLUMNS, |j, k| {
+                let far = j.abs_diff(k) as f64;
+                (0.7 * (j + k) as f64).sin() / (1.0 + far * far)
+                    + if j == k { diagonal } else { 0.0 }
+            })
+        };
+        let solved = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.unwrap().install(|| {
+                let matrices = [matrix(4.0), matrix(3.0), matrix(2.0)];
+                let mut x: Vec<f64> = (0..COLUMNS).map(|j| (1.3 * j as f64).cos()).collect();
+                dense_inverse(matrices, 0.3).unwrap()(&mut x);
+                x.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+            })
+        };
+        let two = solved(2);
+        for threads in [1, 3, 5] {
+            assert!(solved(threads) == two, "{threads} threads");
+        }
     }
 
     #[test]
