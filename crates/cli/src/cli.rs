@@ -308,9 +308,9 @@ pub struct RunOptions {
 #[serde(rename_all = "kebab-case")]
 pub struct FlowOptions {
     /// Time steps, in lengths of the input to the fourth power: controlled (of second order, by their error), auto (by the energy),
-    /// auto:FIRST, VALUE, doubling:FIRST, graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or ramp:VALUE,HALVINGS, whose first
-    /// step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled
-    /// where only --steps or --time end it]
+    /// auto:FIRST, VALUE, doubling:FIRST, graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or
+    /// ramp:VALUE,HALVINGS, whose first step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled where only --steps
+    /// or --time end it]
     #[arg(long, value_name = "TAU")]
     pub tau: Option<StepRule>,
 

@@ -173,7 +173,7 @@ fn every_label_becomes_a_surface() {
         }
     }
     let sample = ["sample", "two.nii", "--label", "all", "--save", "body.stl"];
-    run(folder.path(), &sample);
+    assert!(run(folder.path(), &sample).status.success());
     let counts = volume.labels().unwrap();
     for ((label, count), first) in counts[1..].iter().zip([2.0, 22.0]) {
         let mesh = closed(&folder.path().join(format!("body-label{label}.stl")));
@@ -200,7 +200,7 @@ fn every_label_becomes_a_surface() {
         "--save",
         "body.nii.gz",
     ];
-    run(folder.path(), &sample);
+    assert!(run(folder.path(), &sample).status.success());
     for label in [3, 7] {
         let file = folder.path().join(format!("body-label{label}.nii.gz"));
         assert!(volumes::read(&file).is_ok(), "{label}");

@@ -45,7 +45,7 @@ pub enum Error {
         alternative: &'static str,
     },
     #[error("the measure {name} is {value} at t = {time}")]
-    NotFinite { name: String, value: f64, time: f64 },
+    NonFinite { name: String, value: f64, time: f64 },
     #[error(
         "a run with {cells} cells per side cannot be compared with a reference with {reference}: the latter must be a multiple, in the \
          same box"

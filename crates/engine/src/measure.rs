@@ -27,7 +27,7 @@ pub struct Measure<const D: usize> {
 }
 
 impl<const D: usize> Measure<D> {
-    /// A function of the phase field and the time; nothing where the shape does not have it.
+    /// A function of the phase field and the time; nothing where the shape does not have it. What is not finite stops the run.
     pub fn new(
         name: impl Into<String>,
         of: impl Fn(&Current<'_, D>, f64) -> Result<Option<f64>, geometry::Error>

@@ -448,7 +448,7 @@ fn values<const D: usize>(now: &Current<'_, D>, time: f64) -> Result<Values, Err
     match values.iter().find(|(_, value)| !value.is_finite()) {
         Some((name, &value)) => {
             let name = name.clone();
-            Err(Error::NotFinite { name, value, time })
+            Err(Error::NonFinite { name, value, time })
         }
         None => Ok(values),
     }

@@ -36,7 +36,6 @@ fn a_step_that_is_too_large_is_made_in_substeps() {
     assert!(ends[ends.len() - 1] && ends[..ends.len() - 1].iter().all(|end| !end));
 }
 
-/// A minimization that fails at every size ends the run with the last size that was tried.
 /// A disc grows by a quarter of the interface width in a whole step. What the next step would be refused for is known from how far the last one
 /// went.
 #[test]
@@ -57,6 +56,7 @@ fn a_step_that_moves_the_interface_too_far_is_halved() {
     }
 }
 
+/// A minimization that fails at every size ends the run with the last size that was tried.
 #[test]
 fn halving_gives_up_with_the_size_and_the_step() {
     let mut hopeless = case(Flow::Willmore, Method::Hybrid, square(128));

@@ -81,3 +81,16 @@ fn how_far_the_zero_set_has_gone_is_measured() {
     let run = finished(growing);
     assert_eq!(run.ended(), Some(Stop::Displacement(0.01)));
 }
+
+#[test]
+fn a_measure_that_is_not_finite_stops_a_run() {
+    let mut one = case(Flow::MeanCurvature, Method::Hybrid, disc(128, 0.2));
+    let ratio = |_: &engine::Current<'_, 2>, t: f64| Ok(Some(if t > 0.0 { f64::NAN } else { 1.0 }));
+    one.measures.push(Measure::new("ratio", ratio));
+    let error = Run::new(one, &device()).unwrap().step().unwrap_err();
+    let found = error.to_string();
+    assert!(
+        found.starts_with("the measure ratio is NaN at t = "),
+        "{found}"
+    );
+}

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use proptest::test_runner::{RngSeed, TestCaseError, TestError, TestRunner};
+use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 use crate::change::{Change, Material, changes};
 use crate::peak_of;
@@ -150,13 +150,10 @@ impl<'a> Fuzz<'a> {
                     "{name}: valid file {number}: {result:?}"
                 );
             }
-            let outcome = TestRunner::new(Self::config()).run(
-                &(any::<Index>(), changes(), any::<bool>()),
-                |case| {
-                    let result = one(&self.bytes(&case));
-                    result.map(|_| ()).map_err(TestCaseError::fail)
-                },
-            );
+            let outcome = Self::runner().run(&(any::<Index>(), changes(), any::<bool>()), |case| {
+                let result = one(&self.bytes(&case));
+                result.map(|_| ()).map_err(TestCaseError::fail)
+            });
             match outcome {
                 Ok(()) => {}
                 Err(TestError::Fail(reason, case)) => {
@@ -173,18 +170,24 @@ impl<'a> Fuzz<'a> {
         report
     }
 
-    fn config() -> ProptestConfig {
-        let number = |name: &str| {
+    fn runner() -> TestRunner {
+        let number = |name: &str| -> Option<u32> {
             let text = std::env::var(name).ok()?;
             Some(text.parse().expect("FUZZ_CASES and FUZZ_SEED are numbers"))
         };
-        ProptestConfig {
+        let config = ProptestConfig {
             cases: number("FUZZ_CASES").unwrap_or(CASES),
-            rng_seed: RngSeed::Fixed(number("FUZZ_SEED").map_or(1, u64::from)),
             failure_persistence: None,
             max_shrink_iters: 5000,
             ..ProptestConfig::default()
-        }
+        };
+        let algorithm = RngAlgorithm::ChaCha;
+        // Without the standard library proptest does not look at the seed of its configuration.
+        let rng = match number("FUZZ_SEED") {
+            Some(number) => TestRng::from_seed(algorithm, &[number.to_le_bytes(); 8].concat()),
+            None => TestRng::deterministic_rng(algorithm),
+        };
+        TestRunner::new_with_rng(config, rng)
     }
 
     /// Stores a file, if `FUZZ_KEEP` says where.

@@ -20,11 +20,9 @@ fn disc(radius: f64) -> Ball<2> {
 }
 
 fn deviation(curve: &Polyline, shape: &dyn SignedDistance<2>) -> f64 {
-    curve
-        .points
-        .iter()
-        .map(|&p| shape.signed_distance(p).abs())
-        .fold(0.0, f64::max)
+    let points = curve.points.iter();
+    let distances = points.map(|&p| shape.signed_distance(p).abs());
+    distances.max_by(f64::total_cmp).unwrap()
 }
 
 #[test]

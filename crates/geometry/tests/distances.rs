@@ -5,7 +5,6 @@
 use geometry::shapes::{Ball, Capsule, Cross, Cuboid, Cylinder, Ellipse, Torus};
 use geometry::{Error, Grid, SignedDistance, SignedDistanceExt, phase_field};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 type Shape<const D: usize> = Box<dyn SignedDistance<D>>;
 type Membership<const D: usize> = Box<dyn Fn([f64; D]) -> bool>;
@@ -207,7 +206,6 @@ fn gradient_norm<const D: usize>(shape: &dyn SignedDistance<D>, x: [f64; D]) -> 
 fn config() -> ProptestConfig {
     ProptestConfig {
         cases: 200,
-        rng_seed: RngSeed::Fixed(20),
         failure_persistence: None,
         ..ProptestConfig::default()
     }

@@ -4,7 +4,6 @@
 
 use geometry::{Error, Field, Grid};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 #[test]
 fn grids_follow_the_conventions() {
@@ -95,7 +94,6 @@ fn fields_refuse_wrong_counts_and_bad_values() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        rng_seed: RngSeed::Fixed(7),
         failure_persistence: None,
         ..ProptestConfig::default()
     })]

@@ -121,7 +121,7 @@ fn images_survive_the_way_through_a_phase_field() {
             .iter()
             .flat_map(|c| &c.points)
             .map(|&p| a.signed_distance(p).abs());
-        let apart = apart.fold(0.0, f64::max);
+        let apart = apart.max_by(f64::total_cmp).unwrap();
         println!("  outlines {apart:.3} pixels apart");
         assert_eq!(b.curves().len(), 3);
         assert!(apart < 0.5, "{apart}");

@@ -271,8 +271,9 @@ mod tests {
 
     fn assert_near(a: &[f64], b: &[f64], tolerance: f64) {
         assert_eq!(a.len(), b.len());
-        let pairs = a.iter().zip(b);
-        let error = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        // NaN if there is one.
+        let errors = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        let error = errors.max_by(f64::total_cmp).unwrap_or(0.0);
         assert!(error < tolerance, "{error:e}");
     }
 

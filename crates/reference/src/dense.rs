@@ -82,8 +82,9 @@ impl Newton {
             for (x, s) in result.solution.iter_mut().zip(&step) {
                 *x -= s;
             }
-            let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
-            result.step = step.iter().map(|s| s.abs()).fold(0.0, larger);
+            // What is not a number is larger than all others.
+            let sizes = step.iter().map(|s| s.abs());
+            result.step = sizes.max_by(f64::total_cmp).unwrap_or(0.0);
             result.iterations += 1;
         }
         result

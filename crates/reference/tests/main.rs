@@ -23,9 +23,8 @@ fn measures(curve: &Curve) -> [f64; 5] {
     ]
 }
 
+/// NaN if there is one.
 fn largest_difference<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max)
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.max_by(f64::total_cmp).unwrap_or(0.0)
 }

@@ -99,15 +99,11 @@ impl<'a, R> Sheet<'a, R> {
         value: impl Fn(&'a R) -> C,
     ) -> Self {
         let mut sheet = self.column(head, format, value);
-        let cells = sheet
-            .table
-            .rows
-            .iter()
-            .filter_map(|row| row.last().cloned());
-        let metric = |(row, cell)| ((sheet.key)(row, name), cell);
-        sheet
-            .metrics
-            .extend(sheet.rows.iter().zip(cells).map(metric));
+        let rows = sheet.rows.iter().zip(&sheet.table.rows);
+        let metric = |(row, cells): (&'a R, &Vec<Cell>)| {
+            Some(((sheet.key)(row, name), cells.last()?.clone()))
+        };
+        sheet.metrics.extend(rows.filter_map(metric));
         sheet
     }
 

@@ -62,8 +62,10 @@ impl Cell {
             (Self::Number(number), Some(Format::Fixed(decimals))) => {
                 let text = format!("{number:.decimals$}");
                 // Without the sign of what is zero to these digits.
-                let is_zero = text.parse() == Ok(0.0);
-                (text.strip_prefix('-').filter(|_| is_zero)).map_or(text.clone(), str::to_owned)
+                match text.strip_prefix('-') {
+                    Some(zero) if zero.parse() == Ok(0.0) => zero.to_owned(),
+                    _ => text,
+                }
             }
             (Self::Number(number), Some(Format::Scientific(decimals))) => {
                 scientific(*number, decimals)

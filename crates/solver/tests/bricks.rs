@@ -148,9 +148,8 @@ fn pure_phases_cost_nothing() {
         let image = device
             .values(operator.on(&bricks, &device).apply(u))
             .unwrap();
-        let worst = image
-            .iter()
-            .fold(0.0, |most: f64, v| most.max((v - rest).abs()));
+        let errors = image.iter().map(|v| (v - rest).abs());
+        let worst = errors.max_by(f64::total_cmp).unwrap();
         assert!(
             (rest.abs() - 1.0).abs() < 1e-3 && worst < 1e-13,
             "{rest} {worst:e}"

@@ -157,12 +157,16 @@ fn a_region_is_held_on_both_grids() {
     let inside: Vec<bool> = (0..grid().len())
         .map(|node| grid().node(node).iter().all(|x| x.abs() < 0.16))
         .collect();
-    for region_first in [true, false] {
+    let restricted = |region: &[bool], region_first: bool| {
         let mut flow = flow(!region_first);
-        flow.restrict_to(&inside).unwrap();
+        flow.restrict_to(region).unwrap();
         if region_first {
             flow.begin_on_half_grids(&accurate(256, 33)).unwrap();
         }
+        flow
+    };
+    for region_first in [true, false] {
+        let mut flow = restricted(&inside, region_first);
         let record = flow.advance(TAU).unwrap();
         assert_eq!(record.start.kind, StartKind::HalfGrid);
         let (u, start) = (flow.field().unwrap(), cross());
@@ -181,11 +185,7 @@ fn a_region_is_held_on_both_grids() {
         .map(|node| grid().multi_index(node)[1] == 129)
         .collect();
     for region_first in [true, false] {
-        let mut flow = flow(!region_first);
-        flow.restrict_to(&column).unwrap();
-        if region_first {
-            flow.begin_on_half_grids(&accurate(256, 33)).unwrap();
-        }
+        let mut flow = restricted(&column, region_first);
         assert_eq!(flow.advance(TAU).unwrap().start.kind, StartKind::Rest);
     }
 }

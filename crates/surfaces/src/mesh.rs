@@ -69,22 +69,21 @@ impl TriangleMesh {
     pub fn roughen(&mut self, noise: f64, seed: u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (first, index) = merge_coincident(&self.vertices);
-        let same = |vertex: u32| first[index[vertex as usize] as usize];
-        let faces = self.faces.iter().map(|face| face.map(|v| same(v) as u32));
-        let welded = Self {
-            vertices: self.vertices.clone(),
-            faces: faces.collect(),
-            normals: None,
-        };
-        let normals = self.normals.take();
-        let normals = normals.unwrap_or_else(|| welded.vertex_normals());
+        let first = |vertex: usize| first[index[vertex] as usize];
+        let normals = self.normals.take().unwrap_or_else(|| {
+            let mut welded = self.clone();
+            for face in &mut welded.faces {
+                *face = face.map(|vertex| first(vertex as usize) as u32);
+            }
+            welded.vertex_normals()
+        });
         for (x, normal) in self.vertices.iter_mut().zip(&normals) {
             let length = noise * rng.random_range(-1.0..=1.0);
             *x = std::array::from_fn(|i| length.mul_add(normal[i], x[i]));
         }
         let moved = self.vertices.clone();
-        for (x, &place) in self.vertices.iter_mut().zip(&index) {
-            *x = moved[first[place as usize]];
+        for (vertex, x) in self.vertices.iter_mut().enumerate() {
+            *x = moved[first(vertex)];
         }
     }
 

@@ -6,10 +6,9 @@ use crate::meshes::{folder, sampled};
 use crate::prelude::*;
 use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
 use crate::surfaces::centred_box;
-use ::surfaces::TAUBIN;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
-use surfaces::{Fairing, samples, usual_up_axis};
+use surfaces::{Fairing, TAUBIN, samples, usual_up_axis};
 
 const TITLE: &str = "Noise of meshes taken off";
 /// Standard deviations along the normals, in percent of the longest side.

@@ -4,9 +4,8 @@ use chacha20::ChaCha8Rng;
 
 use crate::prelude::*;
 use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
-use ::surfaces::TAUBIN;
 use rand::{RngExt, SeedableRng};
-use surfaces::samples;
+use surfaces::{TAUBIN, samples};
 use volumes::{Body, Inside, Volume};
 
 const TITLE: &str = "Segmentations without their steps, and their volumes";

@@ -79,15 +79,9 @@ pub fn value_vec(v: &Value) -> Vec<f64> {
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let scale = b.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
-    let worst = a
-        .iter()
-        .zip(b)
-        .map(|(x, y)| (x - y).abs())
-        .fold(
-            0.0,
-            |m: f64, d| if d.is_nan() { f64::NAN } else { m.max(d) },
-        );
-    worst / scale
+    // NaN if there is one.
+    let differences = a.iter().zip(b).map(|(x, y)| (x - y).abs());
+    differences.max_by(f64::total_cmp).unwrap_or(0.0) / scale
 }
 
 pub fn linearization(graph: &Graph, device: &Device) -> Linearization {

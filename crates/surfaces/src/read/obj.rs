@@ -167,17 +167,10 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
 /// with an area does. They point to the side to which most of the old ones do, whichever way the faces wind.
 fn normals(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<Option<[f64; 3]>>, FormatError> {
     let found = Statements::of(bytes)?;
-    let side = side_of(
-        found
-            .normal_areas(&found.vertices)
-            .into_iter()
-            .zip(found.normals.iter().copied()),
-    );
+    let areas = found.normal_areas(&found.vertices).into_iter();
+    let side = side_of(areas.zip(found.normals.iter().copied()));
     // Without the sign of zero.
     let unit = |sum: Vector| Some((side * sum.try_normalize()? + Vector::ZERO).to_array());
-    Ok(found
-        .normal_areas(&moved.vertices)
-        .into_iter()
-        .map(unit)
-        .collect())
+    let areas = found.normal_areas(&moved.vertices);
+    Ok(areas.into_iter().map(unit).collect())
 }

@@ -137,13 +137,16 @@ pub(super) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 3]>>, FormatError>
 pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, FormatError> {
     let header = Header::parse(bytes)?;
     let (element, mut body) = vertices(&header, bytes)?;
-    let mut normals = moved.vertex_normals();
-    let old = decode(bytes)?;
-    let fitting = old.vertex_normals().into_iter().map(Vector::from_array);
-    let old = old.normals.into_iter().flatten().map(Vector::from_array);
-    let side = side_of(fitting.zip(old));
-    for normal in &mut normals {
-        *normal = normal.map(|x| side * x);
+    let mut normals = Vec::new();
+    if element.scalars(["nx", "ny", "nz"]).is_some() {
+        let old = decode(bytes)?;
+        let by_faces = old.vertex_normals().into_iter().map(Vector::from_array);
+        let read = old.normals.into_iter().flatten().map(Vector::from_array);
+        let side = side_of(by_faces.zip(read));
+        normals = moved.vertex_normals();
+        for normal in &mut normals {
+            *normal = normal.map(|x| side * x);
+        }
     }
     let new = [
         (["x", "y", "z"], &moved.vertices),
