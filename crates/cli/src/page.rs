@@ -117,7 +117,7 @@ impl Files<'_> {
         let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
             .collect::<Result<_>>()?;
-        let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
+        let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
         Ok(Some(Viewer::new(
             "The surface over the steps",
             Image::from_bytes(presentation::PICTURE, &poster)?,

@@ -39,7 +39,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 "network": network.map(|n| json!({ "name": n.name, "checksum": n.network.fingerprint() })),
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
-            "outlet": self.presentation,
+            "presentation": self.presentation,
         })
     }
 

@@ -8,6 +8,7 @@ mod energies;
 mod examples;
 #[cfg(unix)]
 mod killed;
+mod options;
 mod own;
 mod page;
 mod refusals;

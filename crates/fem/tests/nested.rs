@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
+use chacha20::ChaCha8Rng;
 use fem::{FiniteElementStep, LinearSolver, Tolerances};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::shapes::Ball;
@@ -10,6 +11,7 @@ use geometry::{Field, Grid, exact, phase_field};
 use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
 use operators::ComputeDevice;
+use rand::{RngExt, SeedableRng};
 use solver::{
     Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, MinimizingMovement,
     NewtonParams, Objective, WillmoreFlow,
@@ -18,15 +20,8 @@ use solver::{
 const STIFFNESS: f64 = 40.0;
 
 fn noise(n: usize, seed: u64) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    (0..n)
-        .map(|_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        })
-        .collect()
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..n).map(|_| rng.random_range(-0.5..0.5)).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -279,13 +279,21 @@ fn gradients_of_the_sizes_are_those_of_a_moving_interface() {
         "{perimeter}"
     );
     let curvature = sizes.mean_curvature();
+    let mut near = 0;
     for (node, k) in curvature.iter().enumerate().filter(|(_, k)| **k != 0.0) {
         let distance = -4.0 / 3.0 * eps * u.values()[node].atanh();
         if distance.abs() < 3.0 * grid.spacing() {
+            near += 1;
             assert!(
                 (k * (radius + distance) / 2.0 - 1.0).abs() < 1e-3,
                 "{k} at {distance}"
             );
         }
     }
+    // A shell of six cells, in cells.
+    let shell = area / grid.spacing().powi(2) * 6.0;
+    assert!(
+        (f64::from(near) / shell - 1.0).abs() < 0.05,
+        "{near} {shell}"
+    );
 }

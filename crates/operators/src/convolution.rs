@@ -119,18 +119,7 @@ pub(crate) fn correlate<T: Real>(x: &[T], g: &[T], shape: &[usize], width: usize
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-        (0..n)
-            .map(|_| {
-                state ^= state << 13;
-                state ^= state >> 7;
-                state ^= state << 17;
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .collect()
-    }
+    use crate::noise;
 
     /// The definition, as a sum.
     fn direct(x: &[f64], shape: &[usize], kernel: &[f64], width: usize, sign: isize) -> Vec<f64> {

@@ -80,3 +80,11 @@ pub use vector::{
     HostUpdate, Motion, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product, retract,
     spectral_filter, update_on_host,
 };
+
+/// Reproducible numbers in `[-1/2, 1/2)`.
+#[cfg(test)]
+fn noise(count: usize, seed: u64) -> Vec<f64> {
+    use rand::{RngExt, SeedableRng};
+    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(seed);
+    (0..count).map(|_| rng.random_range(-0.5..0.5)).collect()
+}

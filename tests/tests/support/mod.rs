@@ -5,9 +5,11 @@
 //! (`cargo test -p workbench-tests --features ndarray`), and its executable runs on other machines too. A GPU backend
 //! that cannot be opened fails its tests, unless the environment variable `WILLMORE_ALLOW_MISSING_GPU` is 1.
 
+use chacha20::ChaCha8Rng;
 use model::training::{SphereData, levenberg_marquardt};
 use model::{Mlp, Network, Provenance, Ratios};
 use operators::{ComputeDevice, DeviceKind};
+use rand::{RngExt, SeedableRng};
 
 /// A device under test.
 #[derive(Clone, Debug)]
@@ -130,15 +132,8 @@ fn splitting_activation() -> Result<Mlp, model::Error> {
 
 /// Reproducible numbers in `[-1, 1)`.
 pub fn noise(count: usize, seed: u64) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    (0..count)
-        .map(|_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            2.0 * (state >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
-        })
-        .collect()
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
 }
 
 /// Inner product.

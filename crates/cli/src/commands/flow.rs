@@ -252,7 +252,7 @@ impl Job {
     ) -> Result<()> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
-        let mut presentation = O::deserialize(&notes["outlet"]).map_err(|reason| {
+        let mut presentation = O::deserialize(&notes["presentation"]).map_err(|reason| {
             let path = stored.path().display();
             Error::options(format!(
                 "{path} cannot be resumed: {reason}; start a new run"

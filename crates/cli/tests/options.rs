@@ -1,0 +1,175 @@
+//! Single options: what they change, and what they leave as it is.
+
+use std::fs;
+use std::path::Path;
+
+use geometry::shapes::{Ball, Ellipse};
+use geometry::{Field, Grid, SignedDistance, npy, phase_field};
+use serde_json::Value;
+
+use crate::common::outcome;
+
+fn number(outcome: &Value, path: &str) -> f64 {
+    let found = outcome.pointer(path).and_then(Value::as_f64);
+    found.unwrap_or_else(|| panic!("no {path} in {outcome}"))
+}
+
+/// The phase field of an ellipse on 96 cells a side.
+fn write_ellipse(path: &Path) {
+    let grid = Grid::<2>::centred(96, 0.75).unwrap();
+    let ellipse = Ellipse::new([0.25, 0.15]).unwrap();
+    npy::write(
+        path,
+        &phase_field(grid, &ellipse, 2.0 * grid.spacing()).unwrap(),
+    )
+    .unwrap();
+}
+
+/// Tolerances of controlled steps are lengths in the units of the input: a smaller one makes more and shorter steps of a smaller error, and the
+/// same shape in another unit, here a power of two, has the same run.
+#[test]
+fn tolerances_are_lengths_in_the_units_of_the_input() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ellipse(&folder.path().join("ellipse.npy"));
+    let flow = |name: &str, unit: f64, tolerance: f64| {
+        let [side, tolerance] = [0.75 * unit, tolerance * unit].map(|length| length.to_string());
+        let time = (2e-3 * unit.powi(4)).to_string();
+        let options = [
+            "--box-side",
+            &side,
+            "--tolerance",
+            &tolerance,
+            "--time",
+            &time,
+        ];
+        let run = ["flow", "ellipse.npy", "--output", name];
+        outcome(folder.path(), &[&run[..], &options].concat())
+    };
+    let loose = flow("loose", 1.0, 1e-3);
+    let tight = flow("tight", 1.0, 1e-4);
+    let error = |outcome: &Value| number(outcome, "/time_steps/estimated_error");
+    assert!(
+        error(&loose) < 1e-3 && error(&tight) < 1e-4,
+        "{loose} {tight}"
+    );
+    assert!(error(&tight) < 0.3 * error(&loose), "{loose} {tight}");
+    assert!(
+        number(&tight, "/steps") > 1.4 * number(&loose, "/steps"),
+        "{loose} {tight}"
+    );
+
+    let other = flow("other", 128.0, 1e-3);
+    assert_eq!(other["steps"], loose["steps"]);
+    let last = |name: &str| fs::read(folder.path().join(name).join("final.npy")).unwrap();
+    assert!(last("other") == last("loose"));
+    assert!(
+        (error(&other) / error(&loose) / 128.0 - 1.0).abs() < 1e-9,
+        "{other}"
+    );
+}
+
+/// Bricks hold a part of the grid, and the flow on them is that on all of it.
+#[test]
+fn what_is_stored_changes_the_cost_and_not_the_flow() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = |storage: &str| {
+        let shape = [
+            "flow",
+            "builtin:torus",
+            "--cells",
+            "48",
+            "--steps",
+            "1",
+            "--tau",
+            "1e-8",
+        ];
+        let options = ["--storage", storage, "--output", storage];
+        outcome(folder.path(), &[&shape[..], &options].concat())
+    };
+    let [dense, bricks] = ["dense", "bricks"].map(flow);
+    assert_eq!(number(&dense, "/grid/stored_cells"), 48_f64.powi(3));
+    assert!(
+        number(&bricks, "/grid/stored_cells") < 0.8 * 48_f64.powi(3),
+        "{bricks}"
+    );
+    for name in ["/energy", "/area", "/volume"] {
+        let [whole, part] = [&dense, &bricks].map(|outcome| number(outcome, name));
+        assert!((part / whole - 1.0).abs() < 1e-6, "{name}: {whole} {part}");
+    }
+}
+
+/// A field of signed distances is the shape whose phase field it would have.
+#[test]
+fn distances_and_phase_fields_are_the_same_shape() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = Grid::<2>::centred(64, 1.0).unwrap();
+    let eps = 2.0 * grid.spacing();
+    let disc = Ball::new([0.03, 0.01], 0.3).unwrap();
+    let distances = Field::from_fn(grid, |x| disc.signed_distance(x));
+    npy::write(folder.path().join("distance.npy"), &distances).unwrap();
+    npy::write(
+        folder.path().join("phase-field.npy"),
+        &phase_field(grid, &disc, eps).unwrap(),
+    )
+    .unwrap();
+    let areas = ["distance", "phase-field"].map(|kind| {
+        let input = format!("{kind}.npy");
+        let run = ["flow", &input, "--holds", kind, "--output", kind];
+        let options = ["--box-side", "1", "--steps", "1", "--tau", "1e-7"];
+        number(
+            &outcome(folder.path(), &[&run[..], &options].concat()),
+            "/area",
+        )
+    });
+    assert!((areas[0] / areas[1] - 1.0).abs() < 1e-9, "{areas:?}");
+}
+
+/// A flow ends with the first step whose energy is no more than what is asked for.
+#[test]
+fn flows_end_at_an_energy() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ellipse(&folder.path().join("ellipse.npy"));
+    let options = [
+        "--box-side",
+        "0.75",
+        "--energy",
+        "16.5",
+        "--tau",
+        "6e-5",
+        "--output",
+        "run",
+    ];
+    let ended = outcome(
+        folder.path(),
+        &[&["flow", "ellipse.npy"][..], &options].concat(),
+    );
+    assert_eq!(ended["energy_reached"], true);
+    let energy = number(&ended, "/energy");
+    assert!(energy <= 16.5, "{ended}");
+    let metrics = fs::read_to_string(folder.path().join("run/metrics.csv")).unwrap();
+    println!("{metrics}");
+}
+
+/// The schemes differ by what the accurate one is better in: the energy of a disc, which is `pi / R`.
+#[test]
+fn the_accurate_scheme_is_the_most_accurate() {
+    let folder = tempfile::tempdir().unwrap();
+    let errors = ["accurate", "calibrated", "paper"].map(|scheme| {
+        let flow = [
+            "flow",
+            "builtin:disc",
+            "--cells",
+            "32",
+            "--steps",
+            "1",
+            "--tau",
+            "1e-9",
+        ];
+        let options = ["--scheme", scheme, "--output", scheme];
+        let ended = outcome(folder.path(), &[&flow[..], &options].concat());
+        let radius = number(&ended, "/length") / std::f64::consts::TAU;
+        (number(&ended, "/energy") * radius / std::f64::consts::PI - 1.0).abs()
+    });
+    println!("{errors:?}");
+    assert!(errors[0] < errors[1] && errors[1] < errors[2], "{errors:?}");
+}
