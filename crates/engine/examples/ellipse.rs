@@ -1,9 +1,6 @@
 //! Willmore flow of an ellipse, which becomes a circle and grows.
 
-use engine::{
-    Case, ErrorControl, Flow, Held, Helfrich, Measure, Operator, Run, Scales, Scheme, Stop,
-    TimeSteps,
-};
+use engine::{Case, ErrorControl, Measure, Operator, Run, Scales, Scheme, Stop, TimeSteps};
 use geometry::{Grid, ZeroSet, phase_field, shapes::Ellipse};
 use model::Networks;
 use operators::ComputeDevice;
@@ -13,18 +10,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scales = Scales::of_grid(grid.spacing(), 2.0);
     let needed = scales.needs(2, grid.spacing());
     let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
+    let initial = phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?;
+    let operator = Operator::learned(Scheme::Accurate, network)?;
+    let steps = TimeSteps::controlled(ErrorControl::default());
     let case = Case {
-        shape: "ellipse".to_owned(),
-        initial: phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?.into(),
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
-        flow: Flow::Willmore,
-        operator: Operator::learned(Scheme::Accurate, network)?,
-        scales,
-        steps: TimeSteps::controlled(ErrorControl::default()),
         stops: vec![Stop::Time(0.002)],
         measures: Measure::crossings(0.0),
+        ..Case::willmore("ellipse", initial, operator, scales, (steps, 0))
     };
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
     println!("       t        tau    length      area    energy");

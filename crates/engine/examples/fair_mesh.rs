@@ -1,6 +1,6 @@
 //! Takes the noise off a closed mesh by Willmore flow: fair_mesh IN OUT, or the built-in lever with noise.
 
-use engine::{Case, Flow, Held, Helfrich, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
+use engine::{Case, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
 use geometry::{Grid, Placement, SignedDistance, optimal_profile};
 use model::Networks;
 use operators::ComputeDevice;
@@ -31,18 +31,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let networks = Networks::default();
     let needed = scales.needs(3, grid.spacing());
     let accurate = (Method::Hybrid, Scheme::Accurate);
+    let operator = Operator::new(accurate, &networks, &needed, &grid, &scales)?;
+    let steps = StepRule::Doubling(Fairing::first_step(grid.spacing()));
     let case = Case {
-        shape: "mesh".to_owned(),
-        initial: initial.into(),
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
-        flow: Flow::Willmore,
-        operator: Operator::new(accurate, &networks, &needed, &grid, &scales)?,
-        scales,
-        steps: StepRule::Doubling(Fairing::first_step(grid.spacing())).into(),
         stops: vec![Stop::Time(fairing.time(grid.spacing(), placement.scale()))],
         measures: Vec::new(),
+        ..Case::willmore("mesh", initial, operator, scales, (steps, 0))
     };
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
     // As far as the noise is.

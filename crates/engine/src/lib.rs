@@ -1,7 +1,7 @@
 //! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
 //!
 //! ```
-//! use engine::{Case, Flow, Held, Helfrich, Measure, Operator, Run, Scales, Scheme, StepRule, Stop};
+//! use engine::{Case, Operator, Run, Scales, Scheme, StepRule};
 //! use geometry::{Grid, phase_field, shapes::Cuboid};
 //! use model::Networks;
 //! use operators::ComputeDevice;
@@ -9,22 +9,13 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A square becomes round: the bending energy falls towards that of a circle, pi / R.
-//! let grid = Grid::<2>::per_unit(64, 1.0)?.with_origin([-0.5; 2])?;
+//! let grid = Grid::<2>::per_unit(64, 1.0)?;
 //! let scales = Scales::of_grid(grid.spacing(), 2.0);
 //! let network = Networks::default().find(Scheme::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
-//! let case = Case {
-//!     shape: "square of side 1/2".to_owned(),
-//!     initial: phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?.into(),
-//!     region: None,
-//!     energy: Helfrich::default(),
-//!     held: Held::default(),
-//!     flow: Flow::Willmore,
-//!     operator: Operator::learned(Scheme::Accurate, network)?,
-//!     scales,
-//!     steps: StepRule::ByEnergy(None).into(),
-//!     stops: vec![Stop::Steps(4)],
-//!     measures: Measure::size(scales.eps),
-//! };
+//! let square = phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?;
+//! let operator = Operator::learned(Scheme::Accurate, network)?;
+//! let steps = (StepRule::ByEnergy(None), 4);
+//! let case = Case::willmore("square of side 1/2", square, operator, scales, steps);
 //! let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
 //! run.advance(None, &mut [], &Interrupt::never())?;
 //! for record in run.records() {

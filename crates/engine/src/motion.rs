@@ -48,14 +48,37 @@ static MAKES: [&(dyn Any + Send + Sync); 2] = [
     &(SolverFlow::motion as Make<3>),
 ];
 
-/// The flow of a case, at a state of it or at its start.
-pub(crate) fn motion<const D: usize>(
+/// The flow of a case, at a state of it or at its start, if it fits into the memory.
+pub(crate) fn of<const D: usize>(
     case: &Case<D>,
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
 ) -> Result<Box<dyn Motion<D>>, Error> {
+    let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
+    let whole = !takes_bricks || case.operator.storage == Storage::Dense;
+    if whole {
+        check_memory(case, device, nodes, takes_bricks)?;
+    }
     let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
-    make.expect("a case is in the plane or in space")(case, state, device)
+    let motion = make.expect("a case is in the plane or in space")(case, state, device)?;
+    if !whole {
+        // How many cells are stored is known only now; little is allocated yet.
+        check_memory(case, device, motion.stored_cells().unwrap_or(nodes), true)?;
+    }
+    Ok(motion)
+}
+
+/// Refuses a flow of which so many cells are stored if the memory of the CPU is too small for it.
+fn check_memory<const D: usize>(
+    case: &Case<D>,
+    device: &ComputeDevice,
+    stored: usize,
+    takes_bricks: bool,
+) -> Result<(), Error> {
+    if device.kind().is_cpu() {
+        Storage::check(case.flow, case.grid(), stored, takes_bricks)?;
+    }
+    Ok(())
 }
 
 /// A flow of the solver.
@@ -173,7 +196,13 @@ impl<const D: usize> Motion<D> for SolverFlow<D> {
     fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
         match &self.flow {
             Either::Willmore(flow) => flow.state(),
-            Either::MeanCurvature(flow) => Ok(FlowState::new(flow.field()?, count, time)),
+            // Nothing else is known of it.
+            Either::MeanCurvature(flow) => Ok(FlowState {
+                current: flow.field()?.into_values(),
+                step: count,
+                time,
+                ..FlowState::default()
+            }),
         }
     }
 
@@ -207,9 +236,7 @@ fn learned<const D: usize>(
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     // Where bricks are no alternative.
     let dense_instead = || -> Result<_, Error> {
-        if device.kind().is_cpu() {
-            Storage::check(case.flow, case.grid(), case.grid().len(), false)?;
-        }
+        check_memory(case, device, case.grid().len(), false)?;
         Ok(dense()?)
     };
     let mut flow = match case.operator.storage {

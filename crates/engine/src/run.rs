@@ -11,10 +11,10 @@ use serde_json::Value;
 use solver::{FlowState, StepRecord};
 
 use crate::current::read;
-use crate::motion::{Motion, motion};
+use crate::motion::{self, Motion};
 use crate::record::Values;
 use crate::steps::StepControl;
-use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Storage, Store};
+use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Store};
 
 /// A case that is being computed: its flow, its place in the time steps, and the records so far.
 pub struct Run<const D: usize> {
@@ -81,7 +81,7 @@ impl<const D: usize> Run<D> {
             ramped += record.tau / step_size;
             control.accept(record)?;
         }
-        let motion = motion_in_memory(&case, state, device)?;
+        let motion = motion::of(&case, state, device)?;
         // Before the first step all of the initial values count, also where they are not stored.
         let begun = state.filter(|_| !records.is_empty());
         let stored = begun.map(|_| motion.stored()).transpose()?;
@@ -198,7 +198,6 @@ impl<const D: usize> Run<D> {
 
     /// A step that succeeds and is short enough.
     fn attempt(&mut self) -> Result<Attempt, Error> {
-        use solver::Error::{NonFinite, NotConverged, NotHeld};
         let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
         if !self.case.held.is_empty() {
             most = most.max(SHORTER);
@@ -233,30 +232,26 @@ impl<const D: usize> Run<D> {
                         (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
                         _ => 0.0,
                     };
-                    match before.as_ref().filter(|_| halvings < SHORTER) {
-                        Some((state, _)) if part > 1.0 => {
-                            let restored = self.motion.restore(state);
-                            restored.map_err(|source| self.failed(source))?;
-                            self.torn = false;
-                        }
-                        _ => {
-                            return Ok(Attempt {
-                                halvings,
-                                far: part > FAR,
-                                refused_hvp,
-                                minimization,
-                            });
-                        }
-                    }
+                    let too_far = part > 1.0 && halvings < SHORTER;
+                    let Some((state, _)) = before.as_ref().filter(|_| too_far) else {
+                        return Ok(Attempt {
+                            halvings,
+                            far: part > FAR,
+                            refused_hvp,
+                            minimization,
+                        });
+                    };
+                    let restored = self.motion.restore(state);
+                    restored.map_err(|source| self.failed(source))?;
+                    self.torn = false;
                     minimization
                 }
                 Ok((minimization, false)) => minimization,
-                Err(NotConverged { .. } | NonFinite { .. } | NotHeld { .. }) if halvings < most => {
-                    None
+                Err(source) if most == 0 || !source.may_be_of_the_step_size() => {
+                    return Err(self.failed(source));
                 }
-                Err(source @ (NotConverged { .. } | NonFinite { .. } | NotHeld { .. }))
-                    if most > 0 =>
-                {
+                Err(_) if halvings < most => None,
+                Err(source) => {
                     return Err(Error::TooStiff {
                         case: self.case.title(),
                         step: self.control.step(),
@@ -265,7 +260,6 @@ impl<const D: usize> Run<D> {
                         source: Box::new(source),
                     });
                 }
-                Err(source) => return Err(self.failed(source)),
             };
             refused_hvp += refused.map_or(0.0, |made| made.hvp());
             size = shorter.unwrap_or(0.5 * size);
@@ -380,30 +374,6 @@ impl<const D: usize> Run<D> {
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
         Ok(self.motion.state(self.records.len(), self.time())?)
     }
-}
-
-/// The flow of a case at a state or at its start, if it fits into the memory.
-fn motion_in_memory<const D: usize>(
-    case: &Case<D>,
-    state: Option<&FlowState<D>>,
-    device: &ComputeDevice,
-) -> Result<Box<dyn Motion<D>>, Error> {
-    let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
-    let check = |stored| {
-        if device.kind().is_cpu() {
-            Storage::check(case.flow, case.grid(), stored, takes_bricks)
-        } else {
-            Ok(())
-        }
-    };
-    if !takes_bricks || case.operator.storage == Storage::Dense {
-        check(nodes)?;
-        return motion(case, state, device);
-    }
-    let motion = motion(case, state, device)?;
-    // How many cells are stored is known only now; little is allocated yet.
-    check(motion.stored_cells().unwrap_or(nodes))?;
-    Ok(motion)
 }
 
 struct Attempt {

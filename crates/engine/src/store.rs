@@ -196,20 +196,17 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
         .with_array("initial", initial.values())
         .with_array("current", state.current);
     packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
-    let all = [
-        ("initial_bricks", initial.nodes().bricks().cloned()),
-        ("bricks", state.bricks),
+    let marks = |bricks: &Arc<Bricks<D>>| bricks.marks();
+    let optional = [
+        ("initial_bricks", initial.nodes().bricks().map(marks)),
+        ("bricks", state.bricks.as_ref().map(marks)),
+        ("previous", previous),
+        ("rate", state.rate),
     ];
-    for (name, bricks) in all {
-        if let Some(bricks) = bricks {
-            packed = packed.with_array(name, bricks.marks());
+    for (name, values) in optional {
+        if let Some(values) = values {
+            packed = packed.with_array(name, values);
         }
-    }
-    if let Some(previous) = previous {
-        packed = packed.with_array("previous", previous);
-    }
-    if let Some(rate) = state.rate {
-        packed = packed.with_array("rate", rate);
     }
     for (level, motion) in state.half_motions.into_iter().enumerate() {
         packed = packed.with_array(&half_motion(level), motion.into_values());
@@ -244,9 +241,9 @@ fn restore<const D: usize>(
         None => None,
     };
     let (mut half_motions, mut half) = (Vec::new(), grid);
-    while state.array(&half_motion(half_motions.len())).is_some() {
+    while let Some(motion) = optional(&half_motion(half_motions.len())) {
         half = half.half()?;
-        half_motions.push(field(stored, &half_motion(half_motions.len()), half)?);
+        half_motions.push(Field::from_values(half, motion)?);
     }
     let at = FlowState {
         bricks: bricks(stored, "bricks", &grid)?,
@@ -302,10 +299,6 @@ fn bricks<const D: usize>(
         Ok(Arc::new(bricks.map_err(|error| unreadable(stored, error))?))
     };
     stored.state().array(name).map(bricks).transpose()
-}
-
-fn field<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Field<D>, Error> {
-    Ok(Field::from_values(grid, values(stored, name)?)?)
 }
 
 fn values(stored: &StoredRun, name: &str) -> Result<Vec<f64>, Error> {

@@ -144,13 +144,7 @@ impl<const D: usize> Trajectory<D> {
                 reference: fine.cells(),
             });
         }
-        let stride = fine.cells() / own.cells();
-        let values = other.field(there)?;
-        let sampled = (0..own.len()).map(|node| {
-            let index = own.multi_index(node).map(|i| i * stride);
-            values.values()[fine.index(index)]
-        });
-        let sampled = Field::from_values(own, sampled.collect())?;
+        let sampled = other.field(there)?.thinned(fine.cells() / own.cells())?;
         Ok(l2_distance(&self.field(step)?, &sampled)?)
     }
 }

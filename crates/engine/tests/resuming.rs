@@ -36,7 +36,7 @@ pub fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajector
     .unwrap()
 }
 
-pub fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
+fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
     let interrupt = Interrupt::never();
     let observers: &mut [&mut dyn Observer<2>] = &mut [&mut After(after, &interrupt)];
     let ended = Trajectory::of(
@@ -50,7 +50,22 @@ pub fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usiz
     assert!(ended.unwrap().is_none());
 }
 
-pub fn without_seconds(trajectory: &Trajectory<2>) -> Vec<engine::Record> {
+/// The same case, interrupted after so many minimizations and taken up again: its records and its end are the same.
+pub fn resumed(
+    reference: &Trajectory<2>,
+    folder: &Path,
+    samples: &Samples,
+    after: usize,
+) -> Trajectory<2> {
+    interrupted(&reference.case, folder, samples, after);
+    let resumed = trajectory(&reference.case, folder, samples);
+    assert_eq!(without_seconds(&resumed), without_seconds(reference));
+    let last = reference.steps();
+    assert_eq!(resumed.field(last).unwrap(), reference.field(last).unwrap());
+    resumed
+}
+
+fn without_seconds(trajectory: &Trajectory<2>) -> Vec<engine::Record> {
     let mut records = trajectory.records.clone();
     for record in &mut records {
         record.seconds = 0.0;
@@ -78,9 +93,7 @@ fn an_interrupted_run_continues_with_the_same_bytes() {
         let whole = case(flow, method, disc(n, 0.2));
         let reference = trajectory(&whole, &folder("whole"), &samples);
         let twice = folder("interrupted");
-        interrupted(&whole, &twice, &samples, 2);
-        let resumed = trajectory(&whole, &twice, &samples);
-        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
+        let resumed = resumed(&reference, &twice, &samples, 2);
         assert_eq!(reference.records.len(), 4);
         assert_eq!(resumed.start, reference.start);
         for step in [0, 1, 2, 4] {
@@ -154,10 +167,7 @@ fn a_driven_run_continues_with_the_same_bytes() {
     let samples = Samples::every(1);
     let reference = trajectory(&case, &root.path().join("whole"), &samples);
     let folder = root.path().join("interrupted");
-    interrupted(&case, &folder, &samples, 1);
-    let resumed = trajectory(&case, &folder, &samples);
-    assert_eq!(without_seconds(&resumed), without_seconds(&reference));
-    assert_eq!(resumed.field(3).unwrap(), reference.field(3).unwrap());
+    resumed(&reference, &folder, &samples, 1);
 }
 
 /// Controlled steps, one of which is refused at first, between marks: the same after an interruption between two of them.
@@ -190,10 +200,7 @@ fn a_controlled_run_continues_with_the_same_bytes() {
     );
     for after in [2, 5] {
         let folder = root.path().join(after.to_string());
-        interrupted(&controlled, &folder, &samples, after);
-        let resumed = trajectory(&controlled, &folder, &samples);
-        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
-        assert_eq!(resumed.field(2).unwrap(), reference.field(2).unwrap());
+        resumed(&reference, &folder, &samples, after);
     }
 }
 

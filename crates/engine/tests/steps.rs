@@ -96,20 +96,25 @@ fn steps_by_the_energy_grow_and_end_at_the_time() {
     assert!(sizes.iter().any(|size| *size > 4.0 * sizes[0]), "{sizes:?}");
 }
 
+/// Of a square, in steps as long as this control allows.
+fn controlled(control: ErrorControl) -> Run<2> {
+    let mut case = case(Flow::Willmore, Method::Hybrid, square(128));
+    case.scales.newton.tolerance = 1e-3;
+    case.steps = TimeSteps::controlled(control);
+    case.stops = vec![Stop::Time(4.0 * TAU)];
+    finished(case)
+}
+
 /// A square from its corners on: steps grow, none moves the interface too far, the energy falls, and the result is that of ten times stricter
 /// control within the estimated error.
 #[test]
 fn controlled_steps_are_as_accurate_as_they_say() {
     let run = |relative, longest| {
-        let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
-        controlled.scales.newton.tolerance = 1e-3;
-        controlled.steps = TimeSteps::controlled(ErrorControl {
+        controlled(ErrorControl {
             relative,
             longest,
             ..ErrorControl::default()
-        });
-        controlled.stops = vec![Stop::Time(4.0 * TAU)];
-        finished(controlled)
+        })
     };
     // The first step, whose error has no estimate, is the same in both.
     let (usual, strict) = (run(0.02, 1.0), run(0.002, 0.5));
@@ -143,14 +148,10 @@ fn controlled_steps_are_as_accurate_as_they_say() {
 #[test]
 fn a_time_error_that_is_given_is_kept() {
     let steps = [3e-4, 3e-5].map(|length| {
-        let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
-        controlled.scales.newton.tolerance = 1e-3;
-        controlled.steps = TimeSteps::controlled(ErrorControl {
+        let run = controlled(ErrorControl {
             length: Some(length),
             ..ErrorControl::default()
         });
-        controlled.stops = vec![Stop::Time(4.0 * TAU)];
-        let run = finished(controlled);
         let estimated = estimated_time_error(run.records()).unwrap();
         assert!(estimated < 1.5 * length, "{estimated:e} of {length:e}");
         run.records().len()

@@ -1,7 +1,7 @@
 //! What is stored of a phase field.
 
 use crate::common::{EPS, TAU, case, device, disc, finished, grid, scales};
-use crate::resuming::{interrupted, trajectory, without_seconds};
+use crate::resuming::{resumed, trajectory};
 use engine::{
     Case, Checkpoints, Error, Flow, Helfrich, Method, Operator, Run, Samples, Scheme, StepRule,
     Stop, Storage, Store,
@@ -64,17 +64,14 @@ fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
         assert!(case.initial.nodes().len() < grid(128).len());
         let reference = trajectory(&case, &root.path().join("whole"), &samples);
         let folder = root.path().join("interrupted");
-        interrupted(&case, &folder, &samples, 2);
+        let resumed = resumed(&reference, &folder, &samples, 2);
         let (initial, _) = engine::initial(&RunDirectory::open(&folder).unwrap()).unwrap();
         let same = Case {
             initial,
             ..case.clone()
         };
         assert_eq!(same.identity(&device()), case.identity(&device()));
-        let resumed = trajectory(&case, &folder, &samples);
-        assert_eq!(without_seconds(&resumed), without_seconds(&reference));
         let (start, end) = (case.initial.field().unwrap(), resumed.field(4).unwrap());
-        assert_eq!(end, reference.field(4).unwrap());
         let stays = |node: usize| region.as_ref().is_some_and(|moves| !moves[node]);
         let values = end.values().iter().zip(start.values()).enumerate();
         for (node, (now, start)) in values.filter(|(node, _)| stays(*node)) {

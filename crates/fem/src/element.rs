@@ -570,11 +570,8 @@ mod tests {
         let n = 150;
         let [a, b, c] = [1, 2, 3].map(|seed| noise(n * n, seed));
         let run = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
-            pool.install(|| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
                 let matrix = Stencil::<2>::with_square(n, 1.0, 1.0, 1.0, &a);
                 (
                     product::<2>(n, &a, &b, &c),

@@ -8,16 +8,11 @@
 //! use fem::FiniteElementStep;
 //! use geometry::{Grid, phase_field, shapes::Ball};
 //! use operators::ComputeDevice;
-//! use solver::{FlowParams, NewtonParams, WillmoreFlow};
+//! use solver::{FlowParams, WillmoreFlow};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let grid = Grid::<2>::per_unit(64, 1.0)?;
-//! let params = FlowParams {
-//!     eps: 2.0 * grid.spacing(),
-//!     mcf_step: grid.spacing().powi(2),
-//!     newton: NewtonParams::default(),
-//!     calibration: solver::Factors::PAPER,
-//! };
+//! let params = FlowParams::paper(2.0 * grid.spacing(), grid.spacing().powi(2));
 //! let disc = phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, params.eps)?;
 //! let step = FiniteElementStep::implicit(&grid, params.eps, params.mcf_step)?;
 //! let device = ComputeDevice::default_compiled()?;

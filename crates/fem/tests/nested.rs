@@ -13,8 +13,8 @@ use linearize::taylor::{halvings, remainder};
 use operators::ComputeDevice;
 use rand::{RngExt, SeedableRng};
 use solver::{
-    Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, MinimizingMovement,
-    NewtonParams, Objective, WillmoreFlow,
+    Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, MinimizingMovement, Objective,
+    WillmoreFlow,
 };
 
 const STIFFNESS: f64 = 40.0;
@@ -171,12 +171,7 @@ fn a_disc_grows_like_the_reference() {
     const RADIUS: f64 = 0.19635;
     let grid = Grid::<2>::per_unit(128, 0.875).unwrap();
     let (eps, tau) = (1.0 / 64.0, 1.0 / 16384.0);
-    let params = FlowParams {
-        eps,
-        mcf_step: tau,
-        newton: NewtonParams::default(),
-        calibration: solver::Factors::PAPER,
-    };
+    let params = FlowParams::paper(eps, tau);
     let start = ball(grid, RADIUS, eps);
     let step = FiniteElementStep::implicit(&grid, eps, tau).unwrap();
     let device = ComputeDevice::default_compiled().unwrap();
@@ -205,12 +200,7 @@ fn a_disc_grows_like_the_reference() {
 fn a_ball_stays_put_and_discs_shrink() {
     let grid = Grid::<3>::per_unit(24, 1.0).unwrap();
     let (eps, size) = (2.0 * grid.spacing(), grid.spacing().powi(2));
-    let params = FlowParams {
-        eps,
-        mcf_step: size,
-        newton: NewtonParams::default(),
-        calibration: solver::Factors::PAPER,
-    };
+    let params = FlowParams::paper(eps, size);
     let device = ComputeDevice::default_compiled().unwrap();
     let start = ball(grid, 0.3, eps);
     let steps = [
@@ -255,12 +245,7 @@ fn a_failing_inner_solver_stops_the_flow_with_its_numbers() {
     assert!(matches!(error, Error::Step(_)), "{error}");
     assert!(error.to_string().contains("Newton's method"), "{error}");
     assert_eq!(flow.field().unwrap(), start, "the flow is where it was");
-    let params = FlowParams {
-        eps,
-        mcf_step: size,
-        newton: NewtonParams::default(),
-        calibration: solver::Factors::PAPER,
-    };
+    let params = FlowParams::paper(eps, size);
     let mut flow = WillmoreFlow::new(step, &start, params, &device).unwrap();
     let error = flow.advance(size).unwrap_err();
     assert!(matches!(error, Error::NonFinite { step: 1, .. }), "{error}");
@@ -272,12 +257,7 @@ fn discs_grow_at_the_predicted_rate() {
     let grid = Grid::<2>::centred(96, 1.5).unwrap();
     let (eps, tau) = (2.0 * grid.spacing(), grid.spacing().powi(2));
     let device = ComputeDevice::default_compiled().unwrap();
-    let params = FlowParams {
-        eps,
-        mcf_step: tau,
-        newton: NewtonParams::default(),
-        calibration: solver::Factors::PAPER,
-    };
+    let params = FlowParams::paper(eps, tau);
     for (step, tolerance) in [
         (FiniteElementStep::implicit(&grid, eps, tau).unwrap(), 0.01),
         (

@@ -15,6 +15,15 @@ fn smooth(grid: Grid<2>) -> Field<2> {
     })
 }
 
+fn step_by(semi: bool, grid: &Grid<2>, eps: f64, size: f64) -> FiniteElementStep<2> {
+    let step = if semi {
+        FiniteElementStep::semi_implicit(grid, eps, size)
+    } else {
+        FiniteElementStep::implicit(grid, eps, size)
+    };
+    step.unwrap()
+}
+
 fn disc(grid: Grid<2>, radius: f64, eps: f64) -> Field<2> {
     phase_field(grid, &Ball::new([0.0, 0.0], radius).unwrap(), eps).unwrap()
 }
@@ -160,11 +169,7 @@ fn second_order_in_space_on_smooth_data() {
         let solve = |n: usize| -> Vec<f64> {
             let grid = Grid::<2>::centred(n, 1.0).unwrap();
             let mut u = smooth(grid);
-            let step = if semi {
-                FiniteElementStep::semi_implicit(&grid, eps, step).unwrap()
-            } else {
-                FiniteElementStep::implicit(&grid, eps, step).unwrap()
-            };
+            let step = step_by(semi, &grid, eps, step);
             for _ in 0..2 {
                 u = step.step(&u).unwrap();
             }
@@ -194,11 +199,7 @@ fn first_order_in_time() {
     for semi in [false, true] {
         let solve = |steps: usize| {
             let size = time / steps as f64;
-            let step = if semi {
-                FiniteElementStep::semi_implicit(&grid, eps, size).unwrap()
-            } else {
-                FiniteElementStep::implicit(&grid, eps, size).unwrap()
-            };
+            let step = step_by(semi, &grid, eps, size);
             let mut u = smooth(grid);
             for _ in 0..steps {
                 u = step.step(&u).unwrap();
@@ -218,11 +219,7 @@ fn a_disc_shrinks_like_the_reference() {
     let radius = 0.125 * PI;
     let grid = Grid::<2>::per_unit(128, 1.5).unwrap();
     for (semi, expected) in [(false, [0.00035, 0.00112]), (true, [0.00070, 0.00227])] {
-        let step = if semi {
-            FiniteElementStep::semi_implicit(&grid, eps, size).unwrap()
-        } else {
-            FiniteElementStep::implicit(&grid, eps, size).unwrap()
-        };
+        let step = step_by(semi, &grid, eps, size);
         let mut u = disc(grid, radius, eps);
         for k in 1..=8 {
             u = step.step(&u).unwrap();

@@ -370,7 +370,7 @@ fn flat<const D: usize>(place: [usize; D], per_axis: usize) -> usize {
 }
 
 /// The inverse of [`flat`].
-fn digits<const D: usize>(mut flat: usize, per_axis: usize) -> [usize; D] {
+pub(crate) fn digits<const D: usize>(mut flat: usize, per_axis: usize) -> [usize; D] {
     let mut place = [0; D];
     for at in place.iter_mut().rev() {
         *at = flat % per_axis;

@@ -131,19 +131,11 @@ impl CliffordTorus {
 
 /// The values at every k-th node along each axis, with the smallest k that leaves at most so many; none where all are left, or too few.
 fn coarsened(u: &Field<3>, most_cells: usize) -> Result<Option<Field<3>>, Error> {
-    let (grid, cells) = (u.grid(), u.grid().cells());
+    let cells = u.grid().cells();
     let every = (1..=cells).find(|k| cells.is_multiple_of(*k) && cells / k <= most_cells);
     // Too few say nothing.
     let every = every.filter(|every| *every > 1 && 4 * (cells / every) > most_cells);
-    let thinned = every.map(|every| {
-        let coarse = Grid::new(cells / every, grid.side())?.with_origin(grid.origin())?;
-        let value = |node| {
-            let fine = coarse.multi_index(node).map(|i| every * i);
-            u.values()[grid.index(fine)]
-        };
-        Field::from_values(coarse, (0..coarse.len()).map(value).collect())
-    });
-    thinned.transpose()
+    every.map(|every| u.thinned(every)).transpose()
 }
 
 /// The best vertex and its cost after a search by the simplex method of Nelder and Mead, from the simplex of a point and its displacements

@@ -1,6 +1,6 @@
 //! Nodal values on a grid.
 
-use crate::nodes::check_finite;
+use crate::nodes::{check_finite, check_values};
 use crate::parallel::Reader;
 use crate::{Error, Grid, Nodes, PhaseField, parallel};
 
@@ -41,16 +41,9 @@ impl<const D: usize> Field<D> {
     /// The number of values must be that of the nodes, and all of them finite; the error names the
     /// first node where they are not.
     pub fn from_values(grid: Grid<D>, values: Vec<f64>) -> Result<Self, Error> {
-        if values.len() != grid.len() {
-            return Err(Error::ValueCount {
-                expected: grid.len(),
-                actual: values.len(),
-            });
-        }
+        check_values(&values, grid.len())?;
         let nodes = grid.into();
-        let field = Self { nodes, values };
-        field.check_finite()?;
-        Ok(field)
+        Ok(Self { nodes, values })
     }
 
     /// Checks that no value is NaN or infinite.

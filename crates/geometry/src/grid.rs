@@ -1,6 +1,7 @@
 //! Periodic cubical grids.
 
 use crate::Error;
+use crate::bricks::digits;
 use crate::error::{finite, positive};
 
 /// A regular grid of `N^D` nodes on a periodic cube of side `L`.
@@ -149,13 +150,7 @@ impl<const D: usize> Grid<D> {
 
     /// Index along each axis of the node with row-major index `index`.
     pub fn multi_index(&self, index: usize) -> [usize; D] {
-        let mut rest = index;
-        let mut multi_index = [0; D];
-        for i in multi_index.iter_mut().rev() {
-            *i = rest % self.cells;
-            rest /= self.cells;
-        }
-        multi_index
+        digits(index, self.cells)
     }
 
     /// Distance in memory between neighbours along `axis`, `N^(D-1-axis)`.

@@ -79,7 +79,7 @@ pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
-pub use nodes::{Nodes, PhaseField};
+pub use nodes::{Nodes, PhaseField, check_values};
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,

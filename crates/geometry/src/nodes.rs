@@ -157,6 +157,18 @@ pub trait PhaseField<const D: usize>: Sync {
     }
 }
 
+/// Refuses another number of values than the expected one, and values that are not finite.
+///
+/// # Errors
+/// [`Error::ValueCount`]; [`Error::NonFinite`] with the first of them.
+pub fn check_values(values: &[f64], expected: usize) -> Result<(), Error> {
+    let actual = values.len();
+    if expected != actual {
+        return Err(Error::ValueCount { expected, actual });
+    }
+    check_finite(values)
+}
+
 /// Checks that no value is NaN or infinite.
 ///
 /// # Errors

@@ -26,6 +26,7 @@ use files::{Number, write_atomically};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::bricks::digits;
 use crate::parallel::{CHUNK, Reader};
 use crate::{Error, Field, Grid};
 pub use error::NpyError;
@@ -167,12 +168,8 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
 
 /// Position in Fortran order of the element at `index` in C order.
 fn reversed<const D: usize>(index: usize, cells: usize) -> usize {
-    let digits = (0..D).scan(index, |rest, _| {
-        let digit = *rest % cells;
-        *rest /= cells;
-        Some(digit)
-    });
-    digits.fold(0, |position, digit| position * cells + digit)
+    let digits = digits::<D>(index, cells);
+    (digits.iter().rev()).fold(0, |position, digit| position * cells + digit)
 }
 
 /// Separates the text of the header from the data.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::nodes::check_values;
 use crate::parallel::{self, Reader};
 use crate::{Bricks, Error, Field, Grid, Nodes, PhaseField};
 
@@ -60,13 +61,8 @@ impl<const D: usize> Stored<D> {
     /// # Errors
     /// [`Error::ValueCount`] for another number of values than of nodes, [`Error::NonFinite`].
     pub fn from_values(nodes: Nodes<D>, values: Vec<f64>) -> Result<Self, Error> {
-        let (expected, actual) = (nodes.len(), values.len());
-        if expected != actual {
-            return Err(Error::ValueCount { expected, actual });
-        }
-        let stored = Self::new(values, nodes, PHASES);
-        stored.check_finite()?;
-        Ok(stored)
+        check_values(&values, nodes.len())?;
+        Ok(Self::new(values, nodes, PHASES))
     }
 
     /// The phase field whose values `read` writes for nodes in a row from one on, perhaps more than once, without the parts of the grid on

@@ -1,4 +1,4 @@
-//! The grid of half as many cells, and fields from there.
+//! Grids of fewer cells, and fields from and on them.
 
 use crate::error::require;
 use crate::{Error, Field, Grid, parallel};
@@ -31,6 +31,20 @@ impl<const D: usize> Field<D> {
             values = refined_along(&values, cells, line);
         }
         Self::from_values(grid, values)
+    }
+
+    /// The values at every k-th node along each axis; `every` must divide the number of cells.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn thinned(&self, every: usize) -> Result<Self, Error> {
+        let fine = self.grid();
+        let coarse = Grid::new(fine.cells() / every, fine.side())?.with_origin(fine.origin())?;
+        let value = |node| {
+            let place = coarse.multi_index(node).map(|i| every * i);
+            self.values()[fine.index(place)]
+        };
+        Self::from_values(coarse, (0..coarse.len()).map(value).collect())
     }
 }
 

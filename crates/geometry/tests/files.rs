@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{doubles, foreign};
+use crate::common::{self, doubles, foreign};
 use geometry::npy::{self, NpyError};
 use geometry::{Error, Field, Grid, vti};
 
@@ -17,6 +17,14 @@ fn sample<const D: usize>(cells: usize) -> Field<D> {
     Field::from_values(grid, values.collect()).unwrap()
 }
 
+/// The bytes that are written to a file.
+fn written(write: impl FnOnce(&Path) -> Result<(), Error>) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("u");
+    write(&path).unwrap();
+    fs::read(path).unwrap()
+}
+
 fn read_back<const D: usize>(path: &Path) -> Result<Field<D>, Error> {
     npy::read(path, |cells| Grid::centred(cells, 2.0))
 }
@@ -25,24 +33,21 @@ fn read_back<const D: usize>(path: &Path) -> Result<Field<D>, Error> {
 fn npy_round_trips_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("u.npy");
-    let plane = sample::<2>(17);
-    npy::write(&path, &plane).unwrap();
-    assert_eq!(read_back::<2>(&path).unwrap(), plane);
-    let space = sample::<3>(5);
-    npy::write(&path, &space).unwrap();
-    assert_eq!(read_back::<3>(&path).unwrap(), space);
-    let line = sample::<1>(6);
-    npy::write(&path, &line).unwrap();
-    assert_eq!(read_back::<1>(&path).unwrap(), line);
+    round_trip::<2>(&path, 17);
+    round_trip::<3>(&path, 5);
+    round_trip::<1>(&path, 6);
+}
+
+fn round_trip<const D: usize>(path: &Path, cells: usize) {
+    let u = sample::<D>(cells);
+    npy::write(path, &u).unwrap();
+    assert_eq!(read_back::<D>(path).unwrap(), u);
 }
 
 #[test]
 fn npy_header_is_the_documented_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("u.npy");
     let u = sample::<2>(3);
-    npy::write(&path, &u).unwrap();
-    let bytes = fs::read(&path).unwrap();
+    let bytes = written(|path| npy::write(path, &u));
     assert_eq!(&bytes[..10], b"\x93NUMPY\x01\x00\x76\x00");
     let text = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }";
     assert!(bytes[10..].starts_with(text.as_bytes()));
@@ -65,11 +70,9 @@ fn npy_files_are_those_of_numpy() {
         .collect();
     let values = vec![1.5, -2.0, 0.1, 3.0];
     assert_eq!(npy::decode::<2>(&numpy), Ok((2, values.clone())));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("u.npy");
     let grid = Grid::<2>::centred(2, 2.0).unwrap();
-    npy::write(&path, &Field::from_values(grid, values).unwrap()).unwrap();
-    assert_eq!(fs::read(&path).unwrap(), numpy);
+    let u = Field::from_values(grid, values).unwrap();
+    assert_eq!(written(|path| npy::write(path, &u)), numpy);
 }
 
 #[test]
@@ -77,21 +80,18 @@ fn npy_reads_what_others_write() {
     let values: Vec<f64> = (0..8_u8).map(|v| f64::from(v) + 0.5).collect();
     let c_order = doubles("(2, 2, 2)", &values);
     assert_eq!(npy::decode::<3>(&c_order), Ok((2, values.clone())));
-    let data: Vec<[u8; 4]> = values.iter().map(|v| (*v as f32).to_le_bytes()).collect();
-    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
+    let data: Vec<u8> = (values.iter())
+        .flat_map(|v| (*v as f32).to_le_bytes())
+        .collect();
     let single = foreign("<f4", false, "(2, 2, 2)", &data);
     assert_eq!(npy::decode::<3>(&single), Ok((2, values.clone())));
-    let data: Vec<[u8; 8]> = values.iter().map(|v| v.to_le_bytes()).collect();
-    let data: Vec<&[u8]> = data.iter().map(|v| &v[..]).collect();
+    let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     let fortran = foreign("<f8", true, "(2, 2, 2)", &data);
     let reordered = [0.5, 4.5, 2.5, 6.5, 1.5, 5.5, 3.5, 7.5].to_vec();
     assert_eq!(npy::decode::<3>(&fortran), Ok((2, reordered)));
     // Big-endian, format 2.0, keys in another order, double quotes.
-    let text = b"{\"shape\":(2,),\"descr\":\">f8\",\"fortran_order\":True}";
-    let mut bytes = b"\x93NUMPY\x02\x00".to_vec();
-    bytes.extend((text.len() as u32).to_le_bytes());
-    bytes.extend(text);
-    bytes.extend([1.5_f64, -2.0].iter().flat_map(|v| v.to_be_bytes()));
+    let text = "{\"shape\":(2,),\"descr\":\">f8\",\"fortran_order\":True}";
+    let bytes = common::npy(2, text, &[1.5, -2.0].map(f64::to_be_bytes).concat());
     assert_eq!(npy::decode::<1>(&bytes), Ok((2, vec![1.5, -2.0])));
 }
 
@@ -110,7 +110,7 @@ fn npy_refuses_what_is_not_a_field() {
         NpyError::NotCubical { shape: vec![2, 3] }
     );
     assert_eq!(
-        decode(&foreign("<i8", false, "(2, 2)", &[&[0; 32]])),
+        decode(&foreign("<i8", false, "(2, 2)", &[0; 32])),
         NpyError::DataType {
             found: "<i8".into()
         }
@@ -148,12 +148,7 @@ fn npy_refuses_what_is_not_a_field() {
 /// Headers that lie about sizes, or are nonsense, give errors and take no memory.
 #[test]
 fn npy_survives_hostile_headers() {
-    let with = |text: &str| {
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((text.len() as u16).to_le_bytes());
-        bytes.extend(text.as_bytes());
-        npy::decode::<2>(&bytes).unwrap_err()
-    };
+    let with = |text: &str| npy::decode::<2>(&common::npy(1, text, &[])).unwrap_err();
     let shape = |shape: &str| {
         with(&format!(
             "{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
@@ -230,10 +225,8 @@ fn errors_name_the_file() {
         })
     ));
     let nowhere = folder.path().join("no/such/folder/u.npy");
-    assert!(matches!(
-        npy::write(nowhere, &sample::<2>(4)),
-        Err(Error::Io(_))
-    ));
+    let written = npy::write(nowhere, &sample::<2>(4));
+    assert!(matches!(written, Err(Error::Io(_))));
 }
 
 /// The value of an attribute after `from` in the XML.
@@ -265,12 +258,9 @@ fn parse_vti(bytes: &[u8], array: &str) -> (String, Vec<f64>) {
 
 #[test]
 fn vti_holds_the_values_with_x_fastest() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("u.vti");
     let grid = Grid::<3>::centred(4, 2.0).unwrap();
     let u = Field::from_fn(grid, |[x, y, z]| x + 10.0 * y + 100.0 * z);
-    vti::write(&path, "a<b & \"c\"", &u).unwrap();
-    let bytes = fs::read(&path).unwrap();
+    let bytes = written(|path| vti::write(path, "a<b & \"c\"", &u));
     let (xml, values) = parse_vti(&bytes, "a&lt;b &amp; &quot;c&quot;");
     assert_eq!(attribute(&xml, "<ImageData", "WholeExtent"), "0 3 0 3 0 3");
     assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 -1");
@@ -287,11 +277,8 @@ fn vti_holds_the_values_with_x_fastest() {
 
 #[test]
 fn vti_of_a_plane_is_one_layer() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("u.vti");
     let u = sample::<2>(5);
-    vti::write(&path, "u", &u).unwrap();
-    let (xml, values) = parse_vti(&fs::read(&path).unwrap(), "u");
+    let (xml, values) = parse_vti(&written(|path| vti::write(path, "u", &u)), "u");
     assert_eq!(attribute(&xml, "<Piece", "Extent"), "0 4 0 4 0 0");
     assert_eq!(attribute(&xml, "<ImageData", "Origin"), "-1 -1 0");
     assert_eq!(values[1].to_bits(), u.values()[5].to_bits());
@@ -301,8 +288,6 @@ fn vti_of_a_plane_is_one_layer() {
 #[test]
 fn vti_has_the_bytes_that_vtk_writes() {
     let by_vtk = include_bytes!("vtk/raw_f64_u64.vti");
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("u.vti");
     // VTK's extent begins at node 1, and its origin belongs to node 0.
     let grid = Grid::<3>::new(2, 1.0).unwrap();
     let grid = grid.with_origin([-0.5, 0.5, 1.5]).unwrap();
@@ -311,8 +296,7 @@ fn vti_has_the_bytes_that_vtk_writes() {
         let [i, j, k] = index(x);
         0.5 + i + 2.0 * j + 4.0 * k
     });
-    vti::write(&path, "u", &u).unwrap();
-    let ours = fs::read(&path).unwrap();
+    let ours = written(|path| vti::write(path, "u", &u));
     let block = |bytes: &[u8]| {
         let marker = b"encoding=\"raw\">";
         let end = bytes.windows(marker.len()).position(|w| w == marker);

@@ -1,6 +1,6 @@
 //! Damaged and malicious NPY files.
 
-use crate::common::{doubles, foreign};
+use crate::common::{self, doubles, foreign};
 use fuzzing::{Fuzz, Limit, assert_short_line, peak_of};
 use geometry::npy::{self, NpyError};
 
@@ -17,15 +17,12 @@ fn fuzzing_npy_files() {
         .iter()
         .flat_map(|v| (*v as f32).to_be_bytes())
         .collect();
-    let mut second = b"\x93NUMPY\x02\x00".to_vec();
-    let text = b"{\"shape\":(2,2,2),\"descr\":\">f8\",\"fortran_order\":True}";
-    second.extend((text.len() as u32).to_le_bytes());
-    second.extend(text);
-    second.extend([0; 64]);
+    let text = "{\"shape\":(2,2,2),\"descr\":\">f8\",\"fortran_order\":True}";
+    let second = common::npy(2, text, &[0; 64]);
     Fuzz::new("npy", NPY)
         .valid([
             doubles("(4, 4, 4)", &numbers),
-            foreign(">f4", true, "(4, 4, 4)", &[&singles]),
+            foreign(">f4", true, "(4, 4, 4)", &singles),
             second,
         ])
         .starts([&b"\x93NUMPY"[..], b"\x93NUMPY\x01\x00\x76\x00{'"])
@@ -71,13 +68,7 @@ fn fuzzing_npy_files() {
 /// Files that make the most of every byte, or announce more than they have.
 #[test]
 fn the_worst_files_stay_within_the_limit() {
-    let npy = |header: &str, data: usize| {
-        let mut bytes = b"\x93NUMPY\x03\x00".to_vec();
-        bytes.extend((header.len() as u32).to_le_bytes());
-        bytes.extend(header.as_bytes());
-        bytes.resize(bytes.len() + data, 0);
-        bytes
-    };
+    let npy = |header: &str, data: usize| common::npy(3, header, &vec![0; data]);
     let array =
         |shape: &str| format!("{{'descr': '<f4', 'fortran_order': True, 'shape': {shape}}}");
     for bytes in [
@@ -104,12 +95,7 @@ fn the_worst_files_stay_within_the_limit() {
 
 #[test]
 fn npy_headers_have_limits() {
-    let error = |header: &str| {
-        let mut bytes = b"\x93NUMPY\x02\x00".to_vec();
-        bytes.extend((header.len() as u32).to_le_bytes());
-        bytes.extend(header.as_bytes());
-        npy::decode::<2>(&bytes).unwrap_err()
-    };
+    let error = |header: &str| npy::decode::<2>(&common::npy(2, header, &[])).unwrap_err();
     assert_eq!(
         error(&" ".repeat(10_001)),
         NpyError::HeaderLength {

@@ -34,43 +34,25 @@ fn centred_grids_have_the_origin_as_a_node() {
 
 #[test]
 fn impossible_grids_are_refused() {
-    assert!(matches!(
-        Grid::<2>::new(1, 1.0),
-        Err(Error::GridTooSmall { cells: 1 })
-    ));
+    let small = Grid::<2>::new(1, 1.0);
+    assert!(matches!(small, Err(Error::GridTooSmall { cells: 1 })));
     for side in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            Grid::<2>::new(8, side),
-            Err(Error::InvalidParameter { .. })
-        ));
-        assert!(matches!(
-            Grid::<2>::per_unit(8, side),
-            Err(Error::InvalidParameter { .. })
-        ));
+        for grid in [Grid::<2>::new(8, side), Grid::per_unit(8, side)] {
+            assert!(matches!(grid, Err(Error::InvalidParameter { .. })));
+        }
     }
-    for cells in [1 << 22, usize::MAX] {
-        assert!(matches!(
-            Grid::<3>::new(cells, 1.0),
-            Err(Error::GridTooLarge { .. })
-        ));
+    for large in [
+        Grid::<3>::new(1 << 22, 1.0).err(),
+        Grid::<3>::new(usize::MAX, 1.0).err(),
+        Grid::<1>::new(usize::MAX, 1.0).err(),
+        Grid::<2>::per_unit(usize::MAX, 1e300).err(),
+    ] {
+        assert!(matches!(large, Some(Error::GridTooLarge { .. })));
     }
-    assert!(matches!(
-        Grid::<1>::new(usize::MAX, 1.0),
-        Err(Error::GridTooLarge { .. })
-    ));
-    assert!(matches!(
-        Grid::<2>::per_unit(3, 0.5),
-        Err(Error::FractionalCells { .. })
-    ));
-    assert!(matches!(
-        Grid::<2>::per_unit(usize::MAX, 1e300),
-        Err(Error::GridTooLarge { .. })
-    ));
-    let grid = Grid::<1>::new(8, 1.0).unwrap();
-    assert!(matches!(
-        grid.with_origin([f64::NAN]),
-        Err(Error::InvalidParameter { .. })
-    ));
+    let fractional = Grid::<2>::per_unit(3, 0.5);
+    assert!(matches!(fractional, Err(Error::FractionalCells { .. })));
+    let moved = Grid::<1>::new(8, 1.0).unwrap().with_origin([f64::NAN]);
+    assert!(matches!(moved, Err(Error::InvalidParameter { .. })));
 }
 
 #[test]

@@ -60,11 +60,8 @@ fn fields_on_different_grids_are_not_compared() {
     let field = |grid| Field::<2>::constant(grid, 0.0);
     let a = field(Grid::new(4, 1.0).unwrap());
     for grid in [Grid::new(5, 1.0), Grid::new(4, 2.0), Grid::centred(4, 1.0)] {
-        let b = field(grid.unwrap());
-        assert!(matches!(
-            measure::l2_distance(&a, &b),
-            Err(Error::GridMismatch { .. })
-        ));
+        let distance = measure::l2_distance(&a, &field(grid.unwrap()));
+        assert!(matches!(distance, Err(Error::GridMismatch { .. })));
     }
 }
 
@@ -251,17 +248,13 @@ fn mean_distance_travelled_by_the_reference_circles() {
 fn measures_refuse_nonsense() {
     let u = ball::<2>(8, 0.5, 0.2);
     for eps in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            measure::perimeter(&u, eps),
-            Err(Error::InvalidParameter { .. })
-        ));
+        let perimeter = measure::perimeter(&u, eps);
+        assert!(matches!(perimeter, Err(Error::InvalidParameter { .. })));
     }
     let mut broken = u.clone();
     broken.values_mut()[3] = f64::NAN;
-    assert!(matches!(
-        broken.check_finite(),
-        Err(Error::NonFinite { index: 3, .. })
-    ));
+    let checked = broken.check_finite();
+    assert!(matches!(checked, Err(Error::NonFinite { index: 3, .. })));
     // A wider check of a combination on a field: the ring between two discs.
     let ring = Ball::new(ORIGIN, 0.6)
         .unwrap()

@@ -9,15 +9,6 @@ use geometry::{
 };
 use rayon::ThreadPoolBuilder;
 
-/// The ellipsoid of revolution about the third axis: the distance is that of the ellipse which is its profile.
-struct Spheroid(Ellipse);
-
-impl SignedDistance<3> for Spheroid {
-    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
-        self.0.signed_distance([x.hypot(y), z])
-    }
-}
-
 /// At 64 cells per unit length and `eps = 2h`.
 fn measured<const D: usize>(side: f64, shape: &impl SignedDistance<D>) -> ZeroSet {
     let grid = Grid::<D>::per_unit(64, side).unwrap();
@@ -109,7 +100,9 @@ fn spheres_and_discs() {
 fn spheroids_ellipses_and_a_torus() {
     for [a, c] in [[0.3, 0.2], [0.2, 0.3]] {
         let profile = Ellipse::new([a, c]).unwrap();
-        close(&measured(1.0, &Spheroid(profile)), spheroid(a, c));
+        // The distance of an ellipsoid of revolution is that of the ellipse which is its profile.
+        let about_z = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
+        close(&measured::<3>(1.0, &about_z), spheroid(a, c));
         close(&measured(1.0, &profile), ellipse(a, c));
     }
     let (major, minor) = (0.32, 0.17);
@@ -156,16 +149,11 @@ fn no_zero_set_has_no_size() {
     }
     let u = Field::constant(grid, 0.0);
     for eps in [0.0, f64::NAN] {
-        assert!(matches!(
-            ZeroSet::of(&u, eps),
-            Err(Error::InvalidParameter { .. })
-        ));
+        let found = ZeroSet::of(&u, eps);
+        assert!(matches!(found, Err(Error::InvalidParameter { .. })));
     }
-    let broken = u.map(|_| f64::NAN);
-    assert!(matches!(
-        ZeroSet::of(&broken, 0.25),
-        Err(Error::NonFinite { .. })
-    ));
+    let broken = ZeroSet::of(&u.map(|_| f64::NAN), 0.25);
+    assert!(matches!(broken, Err(Error::NonFinite { .. })));
 }
 
 #[test]

@@ -308,29 +308,22 @@ impl Classes {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::ir::{name, output, read_only, tensor};
     use burn::backend::ir::{BinaryOpIr, ReduceOpIr, UnaryOpIr};
     use burn::tensor::Shape;
 
-    fn t(id: u64) -> TensorIr {
+    pub(crate) fn t(id: u64) -> TensorIr {
         tensor(id, Shape::from([4, 4]), DType::F64)
     }
 
-    fn binary(make: fn(BinaryOpIr) -> Num, lhs: u64, rhs: u64, out: u64) -> OperationIr {
-        let (lhs, rhs) = (read_only(&t(lhs)), read_only(&t(rhs)));
-        OperationIr::NumericFloat(
-            DType::F64,
-            make(BinaryOpIr {
-                lhs,
-                rhs,
-                out: t(out),
-            }),
-        )
+    pub(crate) fn binary(make: fn(BinaryOpIr) -> Num, lhs: u64, rhs: u64, out: u64) -> OperationIr {
+        let (lhs, rhs, out) = (read_only(&t(lhs)), read_only(&t(rhs)), t(out));
+        OperationIr::NumericFloat(DType::F64, make(BinaryOpIr { lhs, rhs, out }))
     }
 
-    fn abs(input: u64, out: u64) -> OperationIr {
+    pub(crate) fn abs(input: u64, out: u64) -> OperationIr {
         let input = read_only(&t(input));
         OperationIr::NumericFloat(DType::F64, Num::Abs(UnaryOpIr { input, out: t(out) }))
     }

@@ -477,34 +477,12 @@ fn separate(mut block: Block, constants: &HashSet<TensorId>) -> Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::tensor;
+    use crate::fusion::tests::{abs, binary, t};
     use TensorStatus::{ReadOnly, ReadWrite};
-    use burn::backend::ir::{BinaryOpIr, UnaryOpIr};
     use burn::tensor::{Device, Shape};
 
-    fn t(id: u64) -> TensorIr {
-        tensor(id, Shape::from([2, 2]), DType::F64)
-    }
-
     fn mul(lhs: u64, rhs: u64, out: u64) -> OperationIr {
-        OperationIr::NumericFloat(
-            DType::F64,
-            Num::Mul(BinaryOpIr {
-                lhs: read_only(&t(lhs)),
-                rhs: read_only(&t(rhs)),
-                out: t(out),
-            }),
-        )
-    }
-
-    fn abs(input: u64, out: u64) -> OperationIr {
-        OperationIr::NumericFloat(
-            DType::F64,
-            Num::Abs(UnaryOpIr {
-                input: read_only(&t(input)),
-                out: t(out),
-            }),
-        )
+        binary(Num::Mul, lhs, rhs, out)
     }
 
     #[test]

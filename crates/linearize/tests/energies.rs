@@ -22,46 +22,52 @@ fn shift<const D: usize>(u: Tensor<D>, axis: usize) -> Tensor<D> {
     )
 }
 
+/// The width `ε` of interfaces.
+const EPS: f64 = 0.3;
+
 /// `Σ ε/2 |∇u|² + W(u)/ε`, `W(u) = 9/16 (1 − u²)²`, unit grid spacing.
-fn ginzburg_landau<const D: usize>(u: Tensor<D>, eps: f64) -> Tensor<1> {
+fn ginzburg_landau<const D: usize>(u: Tensor<D>) -> Tensor<1> {
     let mut energy = {
         let well = u.clone().square().neg() + 1.0;
-        well.square().sum() * (9.0 / 16.0 / eps)
+        well.square().sum() * (9.0 / 16.0 / EPS)
     };
     for axis in 0..D {
         let slope = shift(u.clone(), axis) - u.clone();
-        energy = energy + slope.powi_scalar(2).sum() * (0.5 * eps);
+        energy = energy + slope.powi_scalar(2).sum() * (0.5 * EPS);
     }
     energy
 }
 
-fn dual_ginzburg_landau<const D: usize>(u: Dual<D>, eps: f64) -> Dual<1> {
+fn dual_ginzburg_landau<const D: usize>(u: Dual<D>) -> Dual<1> {
     let well = (-(u.clone() * u.clone())) + 1.0;
-    let mut energy = (well.clone() * well).sum() * (9.0 / 16.0 / eps);
+    let mut energy = (well.clone() * well).sum() * (9.0 / 16.0 / EPS);
     for axis in 0..D {
         let slope = u.clone().linear(|t| shift(t, axis)) - u.clone();
-        energy = energy + (slope.clone() * slope).sum() * (0.5 * eps);
+        energy = energy + (slope.clone() * slope).sum() * (0.5 * EPS);
     }
     energy
 }
 
+/// Half of the exponent `p`.
+const HALF_P: f64 = 0.75;
+
 /// `Σ (δ² + |∇u|²)^(p/2)`
-fn p_laplacian<const D: usize>(u: Tensor<D>, p: f64) -> Tensor<1> {
+fn p_laplacian<const D: usize>(u: Tensor<D>) -> Tensor<1> {
     let mut norm = u.zeros_like() + 0.1;
     for axis in 0..D {
         let slope = shift(u.clone(), axis) - u.clone();
         norm = norm + slope.clone() * slope;
     }
-    norm.powf_scalar(p / 2.0).sum()
+    norm.powf_scalar(HALF_P).sum()
 }
 
-fn dual_p_laplacian<const D: usize>(u: Dual<D>, p: f64) -> Dual<1> {
+fn dual_p_laplacian<const D: usize>(u: Dual<D>) -> Dual<1> {
     let mut norm = Dual::constant(u.primal.zeros_like() + 0.1);
     for axis in 0..D {
         let slope = u.clone().linear(|t| shift(t, axis)) - u.clone();
         norm = norm + slope.clone() * slope;
     }
-    norm.powf(p / 2.0).sum()
+    norm.powf(HALF_P).sum()
 }
 
 /// Hessian-vector product of a program and by duals.
@@ -92,19 +98,11 @@ fn total(counts: &std::collections::BTreeMap<String, usize>) -> usize {
 fn ginzburg_landau_in_2d_and_3d() {
     for device in devices() {
         let u: Tensor<2> = random(&device, [8, 6], 1, -1.0, 1.0);
-        against_duals(
-            &u,
-            |u| ginzburg_landau(u, 0.3),
-            |u| dual_ginzburg_landau(u, 0.3),
-        );
-        check("Ginzburg-Landau 2D", &u, |u| ginzburg_landau(u, 0.3));
+        against_duals(&u, ginzburg_landau, dual_ginzburg_landau);
+        check("Ginzburg-Landau 2D", &u, ginzburg_landau);
         let u: Tensor<3> = random(&device, [4, 5, 6], 1, -1.0, 1.0);
-        against_duals(
-            &u,
-            |u| ginzburg_landau(u, 0.3),
-            |u| dual_ginzburg_landau(u, 0.3),
-        );
-        check("Ginzburg-Landau 3D", &u, |u| ginzburg_landau(u, 0.3));
+        against_duals(&u, ginzburg_landau, dual_ginzburg_landau);
+        check("Ginzburg-Landau 3D", &u, ginzburg_landau);
     }
 }
 
@@ -112,10 +110,10 @@ fn ginzburg_landau_in_2d_and_3d() {
 fn p_laplacian_in_2d_and_3d() {
     for device in devices() {
         let u: Tensor<2> = random(&device, [7, 6], 2, -1.0, 1.0);
-        against_duals(&u, |u| p_laplacian(u, 1.5), |u| dual_p_laplacian(u, 1.5));
+        against_duals(&u, p_laplacian, dual_p_laplacian);
         let u: Tensor<3> = random(&device, [4, 5, 6], 2, -1.0, 1.0);
-        against_duals(&u, |u| p_laplacian(u, 1.5), |u| dual_p_laplacian(u, 1.5));
-        check("p-Laplacian 3D", &u, |u| p_laplacian(u, 1.5));
+        against_duals(&u, p_laplacian, dual_p_laplacian);
+        check("p-Laplacian 3D", &u, p_laplacian);
     }
 }
 

@@ -1,9 +1,10 @@
 //! Every rule, inside an energy, against Burn's autodiff and finite differences of it.
 
-use crate::common::{self, check, devices, random, separated, tensor};
-use burn::tensor::module::{conv_transpose2d, conv1d, conv2d, conv3d};
-use burn::tensor::ops::{AvgPoolOptions, ConvOptions, ConvTransposeOptions};
-use burn::tensor::{Bool, Int, Tensor, TensorData, activation};
+use crate::common::{check, devices, distance, linearization, random, separated, tensor, vec};
+use burn::tensor::IndexingUpdateOp::Add;
+use burn::tensor::module::{avg_pool2d, conv_transpose2d, conv1d, conv2d, conv3d, linear};
+use burn::tensor::ops::{AvgPoolOptions, ConvOptions, ConvTransposeOptions, PadMode};
+use burn::tensor::{Bool, DType, Int, Tensor, TensorData, activation};
 
 type Energy<const D: usize> = (&'static str, fn(Tensor<D>) -> Tensor<1>);
 
@@ -65,8 +66,7 @@ const POINTWISE: &[Energy<2>] = &[
     ("powf integer", |u| weigh(u.powf_scalar(3.0))),
     ("powf tensor", |u| weigh(u.clone().powf(bend(&u)))),
     ("powf constant exponent", |u| {
-        let e = constant(&u, u.dims(), 5);
-        weigh(u.powf(e))
+        weigh(u.clone().powf(constant(&u, u.dims(), 5)))
     }),
     ("exp", |u| weigh(u.exp())),
     ("log", |u| weigh(u.log())),
@@ -94,8 +94,7 @@ const POINTWISE: &[Energy<2>] = &[
     ("clamp min", |u| weigh(bend(&u).clamp_min(0.7))),
     ("clamp max", |u| weigh(bend(&u).clamp_max(0.7))),
     ("max pair", |u| {
-        let c = constant(&u, u.dims(), 9) - 0.4;
-        weigh(bend(&u).max_pair(c))
+        weigh(bend(&u).max_pair(constant(&u, u.dims(), 9) - 0.4))
     }),
     ("relu", |u| weigh(activation::relu(bend(&u) - 0.7))),
     ("leaky relu", |u| {
@@ -148,22 +147,17 @@ fn activations_have_full_precision_on_every_backend() {
         let p: Tensor<2> = random(&device, [3, 4], 2, -0.1, 0.1);
         for ((name, energy), value, slope) in slopes {
             let graph = Graph::gradient(&[(&u).into()], &[], |i| energy(i.variable(0))).unwrap();
-            let mut lin = common::linearization(&graph, &device);
+            let mut lin = linearization(&graph, &device);
             let at = lin.at(&[(&u).into()], &[]).unwrap();
-            let exact: f64 = common::vec(&u).into_iter().map(value).sum();
-            assert!(
-                common::distance(&at.value.to_vec(), &[exact]) < 1e-14,
-                "{name}"
-            );
-            let exact: Vec<f64> = common::vec(&u).into_iter().map(slope).collect();
-            assert!(
-                common::distance(&at.gradients[0].to_vec(), &exact) < 1e-14,
-                "{name}"
-            );
+            let exact: f64 = vec(&u).into_iter().map(value).sum();
+            assert!(distance(&at.value.to_vec(), &[exact]) < 1e-14, "{name}");
+            let exact: Vec<f64> = vec(&u).into_iter().map(slope).collect();
+            let error = distance(&at.gradients[0].to_vec(), &exact);
+            assert!(error < 1e-14, "{name}");
         }
         let gelu = |i: &linearize::Inputs| activation::gelu(i.variable::<2>(0)).sum();
         let graph = Graph::gradient(&[(&u).into()], &[], gelu).unwrap();
-        let mut lin = common::linearization(&graph, &device);
+        let mut lin = linearization(&graph, &device);
         let at = lin.at(&[(&u).into()], &[]).unwrap();
         let product = lin.apply(&[(&p).into()]).unwrap().remove(0);
         let along = [&at.gradients[0], &product].map(|v| v.dot(&(&p).into()));
@@ -217,36 +211,20 @@ fn reductions() {
     }
 }
 
+/// Several rows for the single one of `u`.
+fn rows(u: &Tensor<2>) -> Tensor<2> {
+    constant(u, [5, 4], 6)
+}
+
 const BROADCASTS: &[Energy<2>] = &[
-    ("add", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(bend(&u) + c)
-    }),
-    ("sub", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(c - bend(&u))
-    }),
-    ("mul", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(bend(&u) * c)
-    }),
-    ("div", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(c / bend(&u))
-    }),
-    ("outer product", |u| {
-        let t = u.clone().transpose();
-        weigh(bend(&u) * t.exp())
-    }),
+    ("add", |u| weigh(bend(&u) + rows(&u))),
+    ("sub", |u| weigh(rows(&u) - bend(&u))),
+    ("mul", |u| weigh(bend(&u) * rows(&u))),
+    ("div", |u| weigh(rows(&u) / bend(&u))),
+    ("outer product", |u| weigh(bend(&u) * u.transpose().exp())),
     ("expand", |u| weigh(bend(&u).expand([3, 4]) * 0.5)),
-    ("remainder", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(bend(&u).remainder(c))
-    }),
-    ("atan2", |u| {
-        let c = constant(&u, [5, 4], 6);
-        weigh(bend(&u).atan2(c))
-    }),
+    ("remainder", |u| weigh(bend(&u).remainder(rows(&u)))),
+    ("atan2", |u| weigh(bend(&u).atan2(rows(&u)))),
 ];
 
 #[test]
@@ -302,16 +280,12 @@ const MOVES: &[Energy<3>] = &[
         weigh(bend(&u).unsqueeze::<4>().expand([3, 2, 3, 4]))
     }),
     ("select", |u| {
-        let i = indices(&u, &[2, 0, 2]);
-        weigh(bend(&u).select(1, i))
+        weigh(bend(&u).select(1, indices(&u, &[2, 0, 2])))
     }),
     ("select assign", |u| {
         let i = indices(&u, &[2, 0]);
         let v = bend(&u).narrow(1, 0, 2);
-        weigh(
-            u.exp()
-                .select_assign(1, i, v, burn::tensor::IndexingUpdateOp::Add),
-        )
+        weigh(u.exp().select_assign(1, i, v, Add))
     }),
     ("gather", |u| {
         let i = indices(&u, &[0, 1, 2, 0, 1, 2, 1, 1]).reshape([2, 1, 4]);
@@ -320,40 +294,28 @@ const MOVES: &[Energy<3>] = &[
     ("scatter", |u| {
         let i = indices(&u, &[0, 1, 2, 0, 1, 2, 1, 1]).reshape([2, 1, 4]);
         let v = bend(&u).narrow(1, 1, 1);
-        weigh(
-            u.exp()
-                .scatter(1, i, v, burn::tensor::IndexingUpdateOp::Add),
-        )
+        weigh(u.exp().scatter(1, i, v, Add))
     }),
     ("mask where", |u| {
-        let m = mask(&u);
-        weigh(bend(&u).mask_where(m, u.exp()))
+        weigh(bend(&u).mask_where(mask(&u), u.exp()))
     }),
     ("mask where constant", |u| {
         let (m, c) = (mask(&u), constant(&u, u.dims(), 2));
         weigh(bend(&u).mask_where(m, c))
     }),
-    ("mask fill", |u| {
-        let m = mask(&u);
-        weigh(bend(&u).mask_fill(m, 0.3))
-    }),
+    ("mask fill", |u| weigh(bend(&u).mask_fill(mask(&u), 0.3))),
     ("mask from the input", |u| {
         let m = u.clone().lower_elem(0.5);
         weigh(bend(&u).mask_where(m, u.exp()))
     }),
     ("bool into float", |u| {
-        let m = u
-            .clone()
-            .greater_elem(0.5)
-            .float()
-            .cast(burn::tensor::DType::F64);
-        mix(&u, m)
+        mix(&u, u.clone().greater_elem(0.5).float().cast(DType::F64))
     }),
     ("pad", |u| {
-        weigh(bend(&u).pad((1, 2, 0, 1), burn::tensor::ops::PadMode::Constant(0.5)))
+        weigh(bend(&u).pad((1, 2, 0, 1), PadMode::Constant(0.5)))
     }),
     ("pad by reflection", |u| {
-        weigh(bend(&u).pad((1, 2, 0, 1), burn::tensor::ops::PadMode::Reflect))
+        weigh(bend(&u).pad((1, 2, 0, 1), PadMode::Reflect))
     }),
     ("unfold", |u| weigh(bend(&u).unfold::<4, _>(2, 2, 1))),
     ("diagonal part", |u| weigh(bend(&u).tril(0))),
@@ -375,20 +337,18 @@ fn options<const N: usize>(stride: usize, padding: usize) -> ConvOptions<N> {
 
 const PRODUCTS: &[Energy<2>] = &[
     ("matmul", |u| {
-        let c = constant(&u, [4, 5], 8);
-        weigh(bend(&u).matmul(c))
+        weigh(bend(&u).matmul(constant(&u, [4, 5], 8)))
     }),
     ("matmul with itself", |u| {
         weigh(u.clone().matmul(u.transpose()))
     }),
     ("matmul of functions", |u| {
-        let v = u.clone().transpose().exp();
-        weigh(bend(&u).matmul(v))
+        weigh(bend(&u).matmul(u.transpose().exp()))
     }),
     ("linear", |u| {
         let w = u.clone().slice([0..3, 0..4]).transpose();
         let b = u.clone().slice([0..1, 0..3]).reshape([3]).exp();
-        weigh(burn::tensor::module::linear(bend(&u), w, Some(b)))
+        weigh(linear(bend(&u), w, Some(b)))
     }),
     ("batched matmul", |u| {
         let a = bend(&u).reshape([2, 2, 3]);
@@ -398,41 +358,25 @@ const PRODUCTS: &[Energy<2>] = &[
     ("conv1d", |u| {
         let w = u.clone().slice([0..2, 0..2]).reshape([2, 1, 2]).exp();
         let b = u.clone().slice([0..1, 0..2]).reshape([2]);
-        weigh(conv1d(
-            bend(&u).reshape([1, 1, 12]),
-            w,
-            Some(b),
-            options(1, 1),
-        ))
+        let x = bend(&u).reshape([1, 1, 12]);
+        weigh(conv1d(x, w, Some(b), options(1, 1)))
     }),
     ("conv2d", |u| {
         let w = u.clone().slice([0..2, 0..2]).reshape([1, 1, 2, 2]).exp();
         let b = u.clone().slice([0..1, 0..1]).reshape([1]);
-        weigh(conv2d(
-            bend(&u).reshape([1, 1, 3, 4]),
-            w,
-            Some(b),
-            options(1, 1),
-        ))
+        let x = bend(&u).reshape([1, 1, 3, 4]);
+        weigh(conv2d(x, w, Some(b), options(1, 1)))
     }),
     ("conv2d with stride", |u| {
         let w = constant(&u, [2, 2], 3).reshape([1, 1, 2, 2]);
-        weigh(conv2d(
-            bend(&u).reshape([1, 1, 3, 4]),
-            w,
-            None,
-            options(2, 0),
-        ))
+        let x = bend(&u).reshape([1, 1, 3, 4]);
+        weigh(conv2d(x, w, None, options(2, 0)))
     }),
     ("conv3d", |u| {
         let w = u.clone().slice([0..2, 0..2]).reshape([1, 1, 1, 2, 2]).exp();
         let b = u.clone().slice([0..1, 0..1]).reshape([1]);
-        weigh(conv3d(
-            bend(&u).reshape([1, 1, 2, 2, 3]),
-            w,
-            Some(b),
-            options(1, 0),
-        ))
+        let x = bend(&u).reshape([1, 1, 2, 2, 3]);
+        weigh(conv3d(x, w, Some(b), options(1, 0)))
     }),
     ("transposed conv2d", |u| {
         let w = u.clone().slice([0..2, 0..2]).reshape([1, 1, 2, 2]).exp();
@@ -441,10 +385,7 @@ const PRODUCTS: &[Energy<2>] = &[
     }),
     ("average pooling", |u| {
         let x = bend(&u).reshape([1, 1, 3, 4]);
-        weigh(burn::tensor::module::avg_pool2d(
-            x,
-            AvgPoolOptions::new([2, 2]),
-        ))
+        weigh(avg_pool2d(x, AvgPoolOptions::new([2, 2])))
     }),
 ];
 
@@ -487,23 +428,18 @@ fn jacobian_vector_products_of_traced_functions() {
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
             let mut lin = program.on(&device, &extensions).unwrap();
             let at = lin.at(&[(&u).into()], &[]).unwrap();
-            let value = common::vec(&map(u.clone()));
-            assert!(
-                common::distance(&at.value.to_vec(), &value) < 1e-13,
-                "{name}"
-            );
-            assert!(
-                common::distance(&at.gradients[0].to_vec(), &value) < 1e-13,
-                "{name}"
-            );
+            let value = vec(&map(u.clone()));
+            for found in [&at.value, &at.gradients[0]] {
+                assert!(distance(&found.to_vec(), &value) < 1e-13, "{name}");
+            }
             let jvp = lin.apply(&[(&p).into()]).unwrap()[0].to_vec();
             let h = 1e-3;
             let at = |t: f64| map(u.clone() + p.clone() * t);
             // Fourth order.
             let near = at(h) - at(-h);
             let far = at(2.0 * h) - at(-2.0 * h);
-            let expected = common::vec(&((near * 8.0 - far) / (12.0 * h)));
-            let error = common::distance(&jvp, &expected);
+            let expected = vec(&((near * 8.0 - far) / (12.0 * h)));
+            let error = distance(&jvp, &expected);
             assert!(error < 1e-9, "{name}: {error:e}");
         }
     }
@@ -518,13 +454,13 @@ fn division_by_a_number_keeps_double_precision() {
         let u: Tensor<2> = random(&device, [3, 4], 61, 0.2, 0.8);
         let energy = |u: Tensor<2>| (u.exp() / 1.7).sum();
         let graph = Graph::gradient(&[(&u).into()], &[], |i| energy(i.variable(0))).unwrap();
-        let mut lin = common::linearization(&graph, &device);
+        let mut lin = linearization(&graph, &device);
         let gradient = lin.at(&[(&u).into()], &[]).unwrap().gradients[0].to_vec();
-        let exact: Vec<f64> = common::vec(&u).iter().map(|x| x.exp() / 1.7).collect();
-        assert!(common::distance(&gradient, &exact) < 1e-14);
+        let exact: Vec<f64> = vec(&u).iter().map(|x| x.exp() / 1.7).collect();
+        assert!(distance(&gradient, &exact) < 1e-14);
         // The reason: if this fails, Burn is fixed, and so can be the repair in `trace.rs`.
-        let rounded = common::vec(&dual::gradient(&u, energy));
-        assert!(common::distance(&rounded, &exact) > 1e-9);
+        let rounded = vec(&dual::gradient(&u, energy));
+        assert!(distance(&rounded, &exact) > 1e-9);
     }
 }
 
@@ -532,6 +468,6 @@ fn division_by_a_number_keeps_double_precision() {
 fn tensor_helper_is_row_major() {
     for device in devices() {
         let t: Tensor<2> = tensor(&device, vec![1.0, 2.0, 3.0, 4.0], [2, 2]);
-        assert_eq!(common::vec(&t.slice([0..1, 0..2])), [1.0, 2.0]);
+        assert_eq!(vec(&t.slice([0..1, 0..2])), [1.0, 2.0]);
     }
 }

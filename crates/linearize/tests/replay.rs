@@ -1,7 +1,7 @@
 //! Programs as objects: parameters, points, errors, memory, threads.
 
 use crate::common::{self, devices, distance, linearization, random, vec};
-use burn::tensor::{DType, Tensor, TensorData};
+use burn::tensor::{DType, Device, Tensor, TensorData};
 use linearize::{Error, Extensions, Graph, Linearization, Value};
 
 /// `Σ c (u − f)² + u⁴`
@@ -14,14 +14,19 @@ fn graph(u: &Tensor<2>, f: &Tensor<2>, c: &Tensor<1>) -> Graph {
     .unwrap()
 }
 
+/// A point, a parameter that could be a direction too, a weight, and the energy of these.
+fn problem(device: &Device) -> (Tensor<2>, Tensor<2>, Tensor<1>, Linearization) {
+    let u: Tensor<2> = random(device, [4, 4], 1, -1.0, 1.0);
+    let f: Tensor<2> = random(device, [4, 4], 2, -1.0, 1.0);
+    let c: Tensor<1> = random(device, [1], 3, 0.5, 1.0);
+    let lin = linearization(&graph(&u, &f, &c), device);
+    (u, f, c, lin)
+}
+
 #[test]
 fn parameters_change_without_tracing_again() {
     for device in devices() {
-        let u: Tensor<2> = random(&device, [4, 4], 1, -1.0, 1.0);
-        let p: Tensor<2> = random(&device, [4, 4], 2, -1.0, 1.0);
-        let f0: Tensor<2> = random(&device, [4, 4], 3, -1.0, 1.0);
-        let c0: Tensor<1> = random(&device, [1], 4, 0.5, 1.0);
-        let mut lin = linearization(&graph(&u, &f0, &c0), &device);
+        let (u, p, _, mut lin) = problem(&device);
         for seed in 5..9 {
             let f: Tensor<2> = random(&device, [4, 4], seed, -1.0, 1.0);
             let c: Tensor<1> = random(&device, [1], seed, 0.5, 1.0);
@@ -46,10 +51,7 @@ fn parameters_change_without_tracing_again() {
 #[test]
 fn evaluating_elsewhere_leaves_the_point_alone() {
     for device in devices() {
-        let u: Tensor<2> = random(&device, [4, 4], 1, -1.0, 1.0);
-        let v: Tensor<2> = random(&device, [4, 4], 2, -1.0, 1.0);
-        let c: Tensor<1> = random(&device, [1], 3, 0.5, 1.0);
-        let mut lin = linearization(&graph(&u, &v, &c), &device);
+        let (u, v, c, mut lin) = problem(&device);
         let parameters = [Value::from(&v), Value::from(&c)];
         lin.at(&[(&u).into()], &parameters).unwrap();
         let before = lin.apply(&[(&v).into()]).unwrap()[0].to_vec();
@@ -63,10 +65,7 @@ fn evaluating_elsewhere_leaves_the_point_alone() {
 #[test]
 fn results_and_arguments_are_never_overwritten() {
     for device in devices() {
-        let u: Tensor<2> = random(&device, [4, 4], 1, -1.0, 1.0);
-        let p: Tensor<2> = random(&device, [4, 4], 2, -1.0, 1.0);
-        let c: Tensor<1> = random(&device, [1], 3, 0.5, 1.0);
-        let mut lin = linearization(&graph(&u, &p, &c), &device);
+        let (u, p, c, mut lin) = problem(&device);
         let parameters = [Value::from(&p), Value::from(&c)];
         let first = lin.at(&[(&u).into()], &parameters).unwrap();
         let (value, gradient) = (first.value.to_vec(), first.gradients[0].to_vec());
@@ -113,14 +112,10 @@ fn assert_is<T>(result: Result<T, Error>, message: &str) {
 #[test]
 fn wrong_arguments_are_named() {
     for device in devices() {
-        let u: Tensor<2> = random(&device, [4, 4], 1, -1.0, 1.0);
-        let c: Tensor<1> = random(&device, [1], 3, 0.5, 1.0);
-        let mut lin = linearization(&graph(&u, &u, &c), &device);
+        let (u, _, c, mut lin) = problem(&device);
         let (v, c) = (Value::from(&u), Value::from(&c));
-        assert!(matches!(
-            lin.apply(std::slice::from_ref(&v)),
-            Err(Error::NotEvaluated)
-        ));
+        let early = lin.apply(std::slice::from_ref(&v));
+        assert!(matches!(early, Err(Error::NotEvaluated)));
         let error = lin.at(std::slice::from_ref(&v), std::slice::from_ref(&v));
         assert_is(error, "parameters: expected 2, found 1");
         let wide: Value = random::<2>(&device, [4, 5], 1, 0.0, 1.0).into();
@@ -154,10 +149,8 @@ fn wrong_arguments_are_named() {
         let error = lin.at(&[tracked], &[v, c]);
         assert_is(error, "variable 0: expected the program's backend, found ");
         // A failed call leaves no point behind.
-        assert!(matches!(
-            lin.apply(&[(&u).into()]),
-            Err(Error::NotEvaluated)
-        ));
+        let later = lin.apply(&[(&u).into()]);
+        assert!(matches!(later, Err(Error::NotEvaluated)));
     }
 }
 

@@ -8,13 +8,9 @@ use crate::Ratios;
 
 /// What can go wrong with networks and their training.
 #[derive(Debug, ThisError)]
-#[error(transparent)]
 pub enum Error {
     #[error("the network does not fit this run: trained for {network}, the run has {run}")]
-    Mismatch {
-        network: Ratios,
-        run: Ratios,
-    },
+    Mismatch { network: Ratios, run: Ratios },
     #[error(
         "no network of the {recipe} recipe for {wanted}; there are {available}. Choose one of these, or train one: \
          willmore train --dimension {} --width {} --eps-over-h {} --step-over-h2 {} --save FILE.safetensors, and give it by --network",
@@ -30,10 +26,7 @@ pub enum Error {
     #[error(
         "the kernel is {width} cells wide, but the grid has only {cells}; use a larger box or a finer grid"
     )]
-    KernelTooWide {
-        width: usize,
-        cells: usize,
-    },
+    KernelTooWide { width: usize, cells: usize },
     #[error(
         "the kernel of this network differs by {error:.0e} of its largest value from a product of functions of one variable, which active \
          bricks need; take a network of the accurate recipe, or store the whole grid"
@@ -45,9 +38,7 @@ pub enum Error {
     #[error(
         "the operator keeps no constant value near {phase}, which active bricks need; train the network longer, or store the whole grid"
     )]
-    NoRest {
-        phase: f64,
-    },
+    NoRest { phase: f64 },
     #[error("impossible ratios ({ratios}): {reason}")]
     Ratios {
         ratios: Ratios,
@@ -60,15 +51,9 @@ pub enum Error {
         found: String,
     },
     #[error("{what}: entry {index} is not finite")]
-    NonFinite {
-        what: &'static str,
-        index: usize,
-    },
+    NonFinite { what: &'static str, index: usize },
     #[error("{path} is not a usable network: {reason}")]
-    Weights {
-        path: PathBuf,
-        reason: String,
-    },
+    Weights { path: PathBuf, reason: String },
     #[error("training: {0}")]
     Training(String),
     #[error(
@@ -87,10 +72,10 @@ pub enum Error {
         eigenvalue: f64,
     },
     #[error("training interrupted after iteration {iteration}; run again to resume")]
-    Interrupted {
-        iteration: usize,
-    },
+    Interrupted { iteration: usize },
+    #[error(transparent)]
     File(#[from] files::Error),
+    #[error(transparent)]
     Operators(#[from] operators::Error),
 }
 

@@ -118,7 +118,7 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
         assert!(matches!(error, Error::Calibration { .. }), "{error}");
     }
     // A network that was never trained.
-    let ratios = ratios(2, 17, 2.0, 1.0);
+    let ratios = Ratios::of_run(2, 17, 1.0, 2.0, 1.0);
     let count = parameter_count(&PAPER_LAYERS);
     let activation = Mlp::new(PAPER_LAYERS.to_vec(), vec![0.1; count]).unwrap();
     let trained = Shipped::Paper.find(ratios).unwrap();
@@ -130,15 +130,6 @@ fn steps_without_an_interface_at_rest_are_refused_with_the_eigenvalue() {
         error.to_string().contains("train the network longer"),
         "{error}"
     );
-}
-
-fn ratios(dimension: usize, width: usize, eps_over_h: f64, step_over_h2: f64) -> Ratios {
-    Ratios {
-        dimension,
-        width,
-        eps_over_h,
-        step_over_h2,
-    }
 }
 
 fn close(a: &Calibration, b: &Calibration, tolerance: f64) -> bool {

@@ -16,12 +16,7 @@ fn read(bytes: &[u8]) -> Result<Network, Error> {
 }
 
 fn network(dimension: usize, width: usize, layers: &[usize]) -> Network {
-    let ratios = Ratios {
-        dimension,
-        width,
-        eps_over_h: 2.0,
-        step_over_h2: 1.0,
-    };
+    let ratios = Ratios::of_run(dimension, width, 1.0, 2.0, 1.0);
     let kernel = (0..ratios.kernel_len()).map(|k| 0.1 * k as f64).collect();
     let parameters = (0..parameter_count(layers))
         .map(|k| -0.1 * k as f64)

@@ -372,10 +372,8 @@ mod tests {
         };
         let found: Vec<f64> = run().into_iter().map(f64::from).collect();
         assert_near(&found, &double, 1e-5);
-        let one = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap();
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1);
+        let one = one.build().unwrap();
         assert_eq!(run(), one.install(run));
         assert_eq!(double, one.install(|| on(&bricks, &x, &taps, true)));
     }

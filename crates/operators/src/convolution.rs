@@ -191,10 +191,8 @@ mod tests {
         let kernel = noise(9, 4);
         let fast = convolve(&x, &shape, &kernel, 3, false);
         assert!(largest_difference(&fast, &direct(&x, &shape, &kernel, 3, 1)) < 1e-13);
-        let one = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap();
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1);
+        let one = one.build().unwrap();
         let serial = one.install(|| convolve(&x, &shape, &kernel, 3, false));
         assert_eq!(fast, serial, "the number of threads must not change a bit");
     }

@@ -331,16 +331,14 @@ mod tests {
         let a: Vec<f32> = a.iter().map(|&a| a as f32).collect();
         let b: Vec<f32> = b.iter().map(|&b| b as f32).collect();
         let results = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let operands = vec![
                 Cow::Borrowed(&a[..]),
                 Cow::Borrowed(&b[..]),
                 Cow::Borrowed(&[0.5]),
             ];
-            pool.install(|| run(&program(), operands, &[DType::F32, DType::F32, DType::F64]))
+            let types = [DType::F32, DType::F32, DType::F64];
+            (pool.build().unwrap()).install(|| run(&program(), operands, &types))
         };
         assert_eq!(results(1), results(3));
     }

@@ -5,30 +5,14 @@ use std::f64::consts::{PI, TAU};
 use reference::Error;
 use reference::equilibria::{Branch, Vesicle, elastica, vesicles};
 
+use crate::integrate;
+
+/// Steps of an integration.
+const STEPS: usize = 20_000;
+
 fn energies(branch: Branch, volumes: &[f64]) -> Vec<f64> {
     let vesicles = vesicles(branch, 0.0, volumes).unwrap();
     vesicles.iter().map(|v| v.energy() / (8.0 * PI)).collect()
-}
-
-/// Steps of the classical Runge-Kutta method.
-fn integrate<const N: usize>(
-    mut y: [f64; N],
-    length: f64,
-    f: impl Fn(&[f64; N]) -> [f64; N],
-) -> [f64; N] {
-    const STEPS: usize = 20_000;
-    let step = length / STEPS as f64;
-    let moved = |y: &[f64; N], k: &[f64; N], by: f64| std::array::from_fn(|i| y[i] + by * k[i]);
-    for _ in 0..STEPS {
-        let a = f(&y);
-        let b = f(&moved(&y, &a, step / 2.0));
-        let c = f(&moved(&y, &b, step / 2.0));
-        let d = f(&moved(&y, &c, step));
-        for i in 0..N {
-            y[i] += step / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
-        }
-    }
-    y
 }
 
 /// Energies of an independent solver of the shape equations.
@@ -98,11 +82,8 @@ fn vesicles_solve_the_shape_equations_from_their_pole() {
             [cos, u, bending, multiplier]
         };
         let length = profile.length() / 4.0 - start;
-        let [r, psi, ..] = integrate(
-            [start, pole * start, pole, slope * start],
-            length,
-            equations,
-        );
+        let begin = [start, pole * start, pole, slope * start];
+        let [r, psi, ..] = integrate(begin, (length, STEPS), equations);
         let errors = [r - profile.point(PI / 2.0)[0], psi - PI / 2.0];
         assert!(
             errors.iter().all(|e| e.abs() < 1e-4),
@@ -139,7 +120,8 @@ fn elastic_curves_close_and_enclose_their_area() {
                 k * k / 2.0,
             ]
         };
-        let end = integrate([0.0, 0.0, 0.0, curvature, 0.0, 0.0, 0.0], TAU, equations);
+        let begin = [0.0, 0.0, 0.0, curvature, 0.0, 0.0, 0.0];
+        let end = integrate(begin, (TAU, STEPS), equations);
         let exact = [
             0.0,
             0.0,
@@ -161,8 +143,6 @@ fn ends_of_branches_are_reported() {
         let result = elastica(&[quotient]);
         assert!(matches!(result, Err(Error::InvalidParameter { .. })));
     }
-    assert!(matches!(
-        vesicles(Branch::Stomatocyte, 0.0, &[0.7]),
-        Err(Error::NoEquilibrium { .. })
-    ));
+    let beyond = vesicles(Branch::Stomatocyte, 0.0, &[0.7]);
+    assert!(matches!(beyond, Err(Error::NoEquilibrium { .. })));
 }

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::integrate;
+
 /// Where the axis of revolution is.
 #[derive(Clone, Copy)]
 pub enum Axis {
@@ -37,22 +39,10 @@ impl Polar {
     }
 
     fn run(&self, start: impl Fn(f64) -> f64, time: f64) -> [f64; 2] {
-        let mut r: Vec<f64> = (0..self.nodes).map(|i| start(self.angle(i))).collect();
+        let r: Vec<f64> = (0..self.nodes).map(|i| start(self.angle(i))).collect();
         let smallest = r.iter().copied().fold(f64::INFINITY, f64::min);
         let steps = (time / (0.12 * (self.spacing() * smallest).powi(4))).ceil();
-        let step = time / steps;
-        let moved = |r: &[f64], v: &[f64], by: f64| -> Vec<f64> {
-            r.iter().zip(v).map(|(r, v)| r + by * v).collect()
-        };
-        for _ in 0..steps as usize {
-            let a = self.rates(&r);
-            let b = self.rates(&moved(&r, &a, step / 2.0));
-            let c = self.rates(&moved(&r, &b, step / 2.0));
-            let d = self.rates(&moved(&r, &c, step));
-            for (i, r) in r.iter_mut().enumerate() {
-                *r += step / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
-            }
-        }
+        let r = integrate(r, (time, steps as usize), |r: &Vec<f64>| self.rates(r));
         [0.0, PI / 2.0].map(|at| self.interpolated(&r, at))
     }
 

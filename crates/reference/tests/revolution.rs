@@ -82,25 +82,17 @@ fn an_independent_method_agrees() {
 fn the_thick_disk_converges() {
     let disk = Shape::rectangle(0.29, 0.1).unwrap();
     let times = [1.0, 5.0, 100.0].map(|k| k / 262144.0);
-    let run = |rounding: f64, tolerance: f64| {
-        let surfaces = evolve(
-            &disk,
-            Flow::Willmore,
-            &times,
-            &Accuracy {
-                rounding,
-                tolerance,
-            },
-        )
-        .unwrap();
+    let run = |rounding: f64| {
+        let accuracy = Accuracy {
+            rounding,
+            tolerance: 10.0 * ACCURACY.tolerance,
+        };
+        let surfaces = evolve(&disk, Flow::Willmore, &times, &accuracy).unwrap();
         surfaces.iter().map(measures).collect::<Vec<_>>()
     };
-    let default = run(ACCURACY.rounding, 10.0 * ACCURACY.tolerance);
+    let default = run(ACCURACY.rounding);
     assert!((default[2][4] - 25.17588).abs() < 1e-4, "{}", default[2][4]);
-    for (a, b) in default
-        .iter()
-        .zip(run(ACCURACY.rounding / 1.6, 10.0 * ACCURACY.tolerance))
-    {
+    for (a, b) in default.iter().zip(run(ACCURACY.rounding / 1.6)) {
         assert!(largest_difference(*a, b) < 2e-5, "{a:?} {b:?}");
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::{Grid, exact::willmore_radius, phase_field, shapes::Ball};
 use operators::{ComputeDevice, SpectralFilter, spectral_filter};
-use solver::{Factors, FlowParams, MeanCurvatureStep, NewtonParams, PhaseInverse, WillmoreFlow};
+use solver::{FlowParams, MeanCurvatureStep, PhaseInverse, WillmoreFlow};
 
 /// `v = u + tautilde (Laplace u + 2 a^2 (u - u^3))`, whose profile `tanh(a d)` is that of this project for `a = 3 / (4 eps)`.
 struct AllenCahn {
@@ -54,12 +54,7 @@ impl MeanCurvatureStep<2> for AllenCahn {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(128, 1.0)?;
-    let params = FlowParams {
-        eps: 3.0 * grid.spacing(),
-        mcf_step: 0.2 * grid.spacing().powi(2),
-        newton: NewtonParams::default(),
-        calibration: Factors::PAPER,
-    };
+    let params = FlowParams::paper(3.0 * grid.spacing(), 0.2 * grid.spacing().powi(2));
     let own = AllenCahn {
         spacing: grid.spacing(),
         step: params.mcf_step,

@@ -88,4 +88,12 @@ impl Error {
         }
         self
     }
+
+    /// Whether a step that failed so may succeed if it is shorter.
+    pub fn may_be_of_the_step_size(&self) -> bool {
+        matches!(
+            self,
+            Self::NotConverged { .. } | Self::NonFinite { .. } | Self::NotHeld { .. }
+        )
+    }
 }

@@ -42,6 +42,17 @@ pub struct FlowParams {
 }
 
 impl FlowParams {
+    /// The scheme of the paper with these scales, and the default minimization.
+    pub fn paper(eps: f64, mcf_step: f64) -> Self {
+        let newton = NewtonParams::default();
+        Self {
+            eps,
+            mcf_step,
+            newton,
+            calibration: Factors::PAPER,
+        }
+    }
+
     /// The network ratios that a grid needs with these scales.
     pub fn ratios<const D: usize>(&self, grid: &Grid<D>, width: usize) -> Ratios {
         Ratios::of_run(D, width, grid.spacing(), self.eps, self.mcf_step)
@@ -125,7 +136,7 @@ impl StepRecord {
 }
 
 /// Where a flow is, for resuming it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlowState<const D: usize> {
     /// The bricks on which the values are, if not on the whole grid.
     pub bricks: Option<Arc<Bricks<D>>>,
@@ -141,21 +152,6 @@ pub struct FlowState<const D: usize> {
     pub step: usize,
     /// Time reached.
     pub time: f64,
-}
-
-impl<const D: usize> FlowState<D> {
-    /// A flow of which nothing is known but where it is.
-    pub fn new(current: Field<D>, step: usize, time: f64) -> Self {
-        Self {
-            bricks: None,
-            current: current.into_values(),
-            previous: None,
-            rate: None,
-            half_motions: Vec::new(),
-            step,
-            time,
-        }
-    }
 }
 
 /// Willmore flow of a phase field by minimizing movements (def:minProblem).

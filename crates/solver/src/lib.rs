@@ -4,18 +4,13 @@
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};
 //! use model::Shipped;
 //! use operators::ComputeDevice;
-//! use solver::{Factors, FlowParams, NewtonParams, WillmoreFlow};
+//! use solver::{FlowParams, WillmoreFlow};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A disc of radius 0.2 grows under Willmore flow: R(t) = (r^4 + 2 t)^(1/4).
 //! let device = ComputeDevice::default_compiled()?;
 //! let grid = Grid::<2>::per_unit(128, 1.25)?;
-//! let params = FlowParams {
-//!     eps: 2.0 * grid.spacing(),
-//!     mcf_step: grid.spacing().powi(2),
-//!     newton: NewtonParams::default(),
-//!     calibration: Factors::PAPER,
-//! };
+//! let params = FlowParams::paper(2.0 * grid.spacing(), grid.spacing().powi(2));
 //! let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 //! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, params.eps);
 //!

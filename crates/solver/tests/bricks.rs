@@ -2,26 +2,22 @@
 
 use std::sync::Arc;
 
-use crate::common::{device, distance, network, noise, params, ratios};
+use crate::common::{accurate, device, distance, dot, network, noise, params, passes_taylor_tests};
 use geometry::distance::SignedDistanceExt;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Cross};
 use geometry::{Bricks, Field, Grid, SignedDistance, phase_field};
-use linearize::taylor::{halvings, remainder};
-use model::{Network, SeparableOperator, Shipped};
+use linearize::taylor::halvings;
+use model::{Network, SeparableOperator};
 use solver::{
     Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
     Precision, StartKind, WillmoreFlow,
 };
 
-fn accurate<const D: usize>() -> Network {
-    Shipped::Accurate.find(ratios(D)).unwrap()
-}
-
 /// Scales with a solver so accurate that only the storage makes a difference.
 fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams {
-        calibration: accurate::<D>().calibration().unwrap().factors,
+        calibration: accurate(D).calibration().unwrap().factors,
         newton: NewtonParams {
             tolerance: 1e-7,
             cg_tolerance: 1e-2,
@@ -50,11 +46,11 @@ fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
 }
 
 fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
-    WillmoreFlow::with_network(&accurate::<D>(), start, params, &device()).unwrap()
+    WillmoreFlow::with_network(&accurate(D), start, params, &device()).unwrap()
 }
 
 fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
-    WillmoreFlow::on_bricks(&accurate::<D>(), start, params, &device()).unwrap()
+    WillmoreFlow::on_bricks(&accurate(D), start, params, &device()).unwrap()
 }
 
 /// The L2 difference of both flows after these steps, over how far they went, and the largest relative difference of their energies.
@@ -102,7 +98,7 @@ fn dented() -> Field<3> {
 /// Gradient and Hessian-vector products of the energy on bricks with holes, about a field that is rough there.
 fn derivatives<const D: usize>(cells: usize) {
     let device = device();
-    let operator = SeparableOperator::<D>::new(&accurate::<D>(), &device).unwrap();
+    let operator = SeparableOperator::<D>::new(&accurate(D), &device).unwrap();
     let hole = |place: [usize; D]| place.iter().sum::<usize>() % 4 == 2;
     let side = operator.brick_side();
     let bricks = Bricks::new(cells, side, |place| !hole(place), |place| place[0] == 0).unwrap();
@@ -117,17 +113,9 @@ fn derivatives<const D: usize>(cells: usize) {
     let direction = device.tensor::<D>(&p, shape);
     let (_, gradient) = energy.evaluate(&device.tensor(&u, shape)).unwrap();
     let product = energy.hessian_vector_product(&direction).unwrap();
-    let dot = |a: burn::tensor::Tensor<D>| -> f64 {
-        let a = device.values(a).unwrap();
-        a.iter().zip(&p).map(|(a, b)| a * b).sum()
-    };
-    let (first, second) = (dot(gradient), dot(product));
-    let mut value = |t: f64| energy.value(&device.tensor(&at(t), shape)).unwrap();
-    for (derivatives, expected) in [(vec![first], 2.0), (vec![first, second], 3.0)] {
-        let rate = remainder(&mut value, &derivatives, &halvings(0.1, 8), 1e-14).rate();
-        let rate = rate.unwrap();
-        assert!((rate - expected).abs() < 0.1, "{D}D, {expected}: {rate}");
-    }
+    let derivatives = [gradient, product].map(|a| dot(&device.values(a).unwrap(), &p));
+    let value = |t: f64| energy.value(&device.tensor(&at(t), shape)).unwrap();
+    passes_taylor_tests(value, derivatives, &halvings(0.1, 8));
 }
 
 #[test]
@@ -139,7 +127,7 @@ fn derivatives_pass_taylor_tests() {
 #[test]
 fn pure_phases_cost_nothing() {
     let (device, grid) = (device(), Grid::<3>::centred(32, 0.5).unwrap());
-    let operator = SeparableOperator::<3>::new(&accurate::<3>(), &device).unwrap();
+    let operator = SeparableOperator::<3>::new(&accurate(3), &device).unwrap();
     for (phase, rest) in [false, true].into_iter().zip(operator.rests()) {
         let some = |place: [usize; 3]| place[0] != place[1];
         let bricks = Bricks::new(grid.cells(), 8, some, |_| phase).unwrap();
@@ -301,7 +289,7 @@ fn a_region_moves_on_bricks_as_on_the_grid() {
 /// As [`difference`], with these terms in the energy.
 fn difference_with<const D: usize>(start: &Field<D>, helfrich: Helfrich) -> (f64, f64) {
     let params = exact(start.grid());
-    let response = accurate::<D>().calibration().unwrap().response();
+    let response = accurate(D).calibration().unwrap().response();
     let mut flows = (dense(start, params), bricks(start, params));
     flows.0.set_energy(helfrich, response).unwrap();
     flows.1.set_energy(helfrich, response).unwrap();
@@ -338,17 +326,17 @@ fn what_bricks_cannot_do_is_refused_in_one_line() {
     };
     let error = on(&network(), &start).err().unwrap();
     assert!(error.to_string().contains("accurate recipe"), "{error}");
-    let flat = on(&accurate::<2>(), &Field::constant(grid, 1.0));
+    let flat = on(&accurate(2), &Field::constant(grid, 1.0));
     assert!(matches!(flat, Err(Error::NoInterface)));
     let odd = Grid::<2>::centred(72, 72.0 / 128.0).unwrap();
     let odd = on(
-        &accurate::<2>(),
+        &accurate(2),
         &field(odd, &Ball::new([0.0, 0.0], 0.2).unwrap()),
     );
     assert!(odd.err().unwrap().to_string().contains("bricks of 16"));
 
     let mut flow = bricks(&start, usual(&grid));
-    assert_eq!(flow.begin_on_half_grids(&accurate::<2>()).unwrap(), 0);
+    assert_eq!(flow.begin_on_half_grids(&accurate(2)).unwrap(), 0);
     assert_ne!(flow.advance(1e-5).unwrap().start.kind, StartKind::HalfGrid);
     let whole = distance(flow.field().unwrap().values(), start.values());
     assert!(whole > 0.0);

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use crate::common::{ball, device, network, params};
+use crate::common::{accurate, ball, device, network, params, ratios};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
-use model::{Calibration, Network, Ratios, Shipped};
+use model::{Calibration, Network, Shipped};
 use solver::{Error, Factors, FlowParams, WillmoreFlow};
 
 /// A radius of the reference experiment, `2^-4 pi`.
@@ -32,10 +32,7 @@ fn flow(network: &Network, start: &Field<2>, calibration: Factors) -> WillmoreFl
 fn errors(network: &Network, radius: f64, phase: f64, calibration: Factors) -> Vec<f64> {
     let last = exact::willmore_radius(radius, 64.0 * TAU, 2);
     let grid = grid(last);
-    let disc = |radius| {
-        let values = ball(grid, radius).into_values().into_iter();
-        Field::from_values(grid, values.map(|u| phase * u).collect()).unwrap()
-    };
+    let disc = |radius| ball(grid, radius).map(|u| phase * u);
     let mut flow = flow(network, &disc(radius), calibration);
     let mut errors = Vec::new();
     for step in 1..=64 {
@@ -68,7 +65,7 @@ fn the_same_network_flows_along_the_exact_solution_once_calibrated() {
 
 #[test]
 fn the_accurate_operator_keeps_to_a_circle_within_twelve_ten_thousandths() {
-    let network = Shipped::Accurate.find(network().ratios()).unwrap();
+    let network = accurate(2);
     let factors = network.calibration().unwrap().factors;
     for phase in [1.0, -1.0] {
         let found = errors(&network, RADIUS, phase, factors);
@@ -91,20 +88,24 @@ fn calibrated_circles_of_the_convergence_test_stay_within_six_thousandths() {
     }
 }
 
+/// The area of a disc (`phase = 1`) or of the hole that its complement leaves (`-1`).
+fn area(flow: &WillmoreFlow<2>, phase: f64) -> f64 {
+    let u = flow.field().unwrap();
+    let inside = zero_set_volume(&u);
+    if phase > 0.0 {
+        inside
+    } else {
+        u.grid().side().powi(2) - inside
+    }
+}
+
 /// Willmore energy over `pi / R` of a relaxed disc, with its radius, after a step so small that it hardly moves.
 fn energy(network: &Network, radius: f64, phase: f64, calibration: Factors) -> (f64, f64) {
     let grid = grid(radius);
-    let values = ball(grid, radius).into_values().into_iter();
-    let start = Field::from_values(grid, values.map(|u| phase * u).collect()).unwrap();
+    let start = ball(grid, radius).map(|u| phase * u);
     let mut flow = flow(network, &start, calibration);
     let record = flow.advance(TAU / 8.0).unwrap();
-    let inside = zero_set_volume(&flow.field().unwrap());
-    let area = if phase > 0.0 {
-        inside
-    } else {
-        grid.side().powi(2) - inside
-    };
-    let radius = (area / PI).sqrt();
+    let radius = (area(&flow, phase) / PI).sqrt();
     (record.willmore_energy * radius / PI, radius)
 }
 
@@ -149,19 +150,9 @@ fn circles_without_calibration_move_at_the_predicted_speed() {
         for phase in [1.0, -1.0] {
             // R^4 grows by 2 c/m t. Steps that are small, and long enough to be measured.
             let tau = TAU * (radius / 0.2_f64).powi(4);
-            let values = ball(grid(radius + 0.1), radius).into_values().into_iter();
-            let values = values.map(|u| phase * u).collect();
-            let start = Field::from_values(grid(radius + 0.1), values).unwrap();
+            let start = ball(grid(radius + 0.1), radius).map(|u| phase * u);
             let mut flow = flow(&network, &start, Factors::PAPER);
-            let quartic = |flow: &WillmoreFlow<2>| {
-                let inside = zero_set_volume(&flow.field().unwrap());
-                let area = if phase > 0.0 {
-                    inside
-                } else {
-                    start.grid().side().powi(2) - inside
-                };
-                (area / PI).powi(2)
-            };
+            let quartic = |flow: &WillmoreFlow<2>| (area(flow, phase) / PI).powi(2);
             flow.advance(tau).unwrap();
             let before = quartic(&flow);
             for _ in 0..4 {
@@ -182,13 +173,7 @@ fn circles_without_calibration_move_at_the_predicted_speed() {
 
 #[test]
 fn energies_of_spheres_are_as_predicted() {
-    let ratios = Ratios {
-        dimension: 3,
-        width: 17,
-        eps_over_h: 2.0,
-        step_over_h2: 1.0,
-    };
-    let network = Shipped::Paper.find(ratios).unwrap();
+    let network = Shipped::Paper.find(ratios(3)).unwrap();
     let calibration = network.calibration().unwrap();
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     for (calibration, expected) in [
@@ -231,18 +216,9 @@ fn factors_enter_the_record_and_bad_ones_are_refused() {
     let [area, plain_area] = [&calibrated, &papers].map(|f| zero_set_volume(&f.field().unwrap()));
     assert!(close(area, plain_area));
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        for factors in [
-            Factors {
-                energy: bad,
-                ..Factors::PAPER
-            },
-            Factors {
-                metric: bad,
-                ..Factors::PAPER
-            },
-        ] {
+        for (energy, metric) in [(bad, 1.0), (1.0, bad)] {
             let params = FlowParams {
-                calibration: factors,
+                calibration: Factors { energy, metric },
                 ..params(start.grid())
             };
             let flow = WillmoreFlow::with_network(&network(), &start, params, &device());

@@ -1,20 +1,11 @@
 //! Flows with perimeter and volume held.
 
-use crate::common::{ball, device, network, params};
+use crate::common::{accurate, ball, device, network, params};
 use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, SignedDistance, ZeroSet, phase_field};
-use model::{Ratios, Shipped};
+use model::Shipped;
 use solver::{Constraints, Error, Exit, StepRecord, WillmoreFlow};
-
-/// The ellipsoid of revolution about the third axis.
-struct Spheroid(Ellipse);
-
-impl SignedDistance<3> for Spheroid {
-    fn signed_distance(&self, [x, y, z]: [f64; 3]) -> f64 {
-        self.0.signed_distance([x.hypot(y), z])
-    }
-}
 
 const BOTH: [bool; 2] = [true, true];
 const PERIMETER: [bool; 2] = [true, false];
@@ -35,27 +26,26 @@ fn measured<const D: usize>(u: &Field<D>) -> ZeroSet {
 
 /// A calibrated flow, free.
 fn free<const D: usize>(u: &Field<D>) -> WillmoreFlow<D> {
-    let ratios = Ratios {
-        dimension: D,
-        width: 17,
-        eps_over_h: 2.0,
-        step_over_h2: 1.0,
-    };
-    let network = Shipped::Accurate.find(ratios).unwrap();
+    let network = accurate(D);
     let mut params = params(u.grid());
     params.calibration = network.calibration().unwrap().factors;
     WillmoreFlow::with_network(&network, u, params, &device()).unwrap()
+}
+
+fn hold<const D: usize>(
+    flow: &mut WillmoreFlow<D>,
+    perimeter: Option<f64>,
+    volume: Option<f64>,
+) -> Result<(), Error> {
+    flow.constrain(Constraints { perimeter, volume })
 }
 
 /// A flow that keeps perimeter or volume or both.
 fn keeping<const D: usize>(u: &Field<D>, [perimeter, volume]: [bool; 2]) -> WillmoreFlow<D> {
     let all = Constraints::keeping(u, params(u.grid()).eps).unwrap();
     let mut flow = free(u);
-    flow.constrain(Constraints {
-        perimeter: all.perimeter.filter(|_| perimeter),
-        volume: all.volume.filter(|_| volume),
-    })
-    .unwrap();
+    let perimeter = all.perimeter.filter(|_| perimeter);
+    hold(&mut flow, perimeter, all.volume.filter(|_| volume)).unwrap();
     flow
 }
 
@@ -143,9 +133,8 @@ fn the_pressure_on_a_driven_disc_is_the_exact_one() {
     let [mut radius, rate] = [0.25, -32.0];
     for step in 0..3 {
         radius += tau * rate;
-        let volume = Some(std::f64::consts::PI * radius * radius);
-        let perimeter = None;
-        flow.constrain(Constraints { perimeter, volume }).unwrap();
+        let volume = std::f64::consts::PI * radius * radius;
+        hold(&mut flow, None, Some(volume)).unwrap();
         let (record, _) = flow.advance_second_order(tau, |_| true).unwrap();
         let exact = 0.5 / radius.powi(3) - rate;
         let pressure = record.pressure.unwrap();
@@ -162,11 +151,8 @@ fn multipliers_are_derivatives_of_the_energy_at_rest() {
     let all = Constraints::keeping(&u, params(u.grid()).eps).unwrap();
     let at_rest = |perimeter: f64, volume: f64| {
         let mut flow = free(&u);
-        flow.constrain(Constraints {
-            perimeter: all.perimeter.map(|p| p * perimeter),
-            volume: all.volume.map(|v| v * volume),
-        })
-        .unwrap();
+        let perimeter = all.perimeter.map(|p| p * perimeter);
+        hold(&mut flow, perimeter, all.volume.map(|v| v * volume)).unwrap();
         let tau = 32.0 * plane().spacing().powi(2);
         // The targets are not those of the start.
         flow.advance(tau / 32.0).unwrap();
@@ -190,8 +176,9 @@ fn multipliers_are_derivatives_of_the_energy_at_rest() {
 #[test]
 fn a_spheroid_keeps_its_volume_in_space() {
     let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
-    let shape = Spheroid(Ellipse::new([0.3, 0.24]).unwrap());
-    let u = phase_field(grid, &shape, params(&grid).eps).unwrap();
+    let profile = Ellipse::new([0.3, 0.24]).unwrap();
+    let spheroid = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
+    let u = phase_field(grid, &spheroid, params(&grid).eps).unwrap();
     let tau = 0.25 * grid.spacing().powi(2);
     let cost = products(&run(&mut free(&u), [false; 2], tau, 4).0);
     let (records, drift) = run(&mut keeping(&u, VOLUME), VOLUME, tau, 4);
@@ -225,11 +212,7 @@ fn a_target_that_moves_is_met_in_every_step() {
     let area = measured(&u).volume;
     for step in 1..=4 {
         let target = area * (1.0 - 0.01 * f64::from(step));
-        flow.constrain(Constraints {
-            volume: Some(target),
-            ..Constraints::default()
-        })
-        .unwrap();
+        hold(&mut flow, None, Some(target)).unwrap();
         flow.advance(plane().spacing().powi(2)).unwrap();
         let found = measured(&flow.field().unwrap()).volume;
         assert!((found / target - 1.0).abs() < 1e-11);
@@ -288,28 +271,14 @@ fn a_restored_flow_continues_with_the_same_bytes() {
 fn half_grids_are_held_too() {
     let grid = Grid::<2>::per_unit(256, 0.75).unwrap();
     let eps = 4.0 * grid.spacing();
-    let ratios = Ratios {
-        dimension: 2,
-        width: 33,
-        eps_over_h: 4.0,
-        step_over_h2: 4.0,
-    };
-    let network = Shipped::Accurate.find(ratios).unwrap();
-    let params = solver::FlowParams {
-        eps,
-        mcf_step: 4.0 * grid.spacing().powi(2),
-        newton: solver::NewtonParams::default(),
-        calibration: network.calibration().unwrap().factors,
-    };
+    let mut params = solver::FlowParams::paper(eps, 4.0 * grid.spacing().powi(2));
+    let network = Shipped::Accurate.find(params.ratios(&grid, 33)).unwrap();
+    params.calibration = network.calibration().unwrap().factors;
     let u = phase_field(grid, &Ellipse::new([0.25, 0.15]).unwrap(), eps).unwrap();
     let mut flow = WillmoreFlow::with_network(&network, &u, params, &device()).unwrap();
     assert!(flow.begin_on_half_grids(&network).unwrap() > 0);
     let held = Constraints::keeping(&u, eps).unwrap();
-    flow.constrain(Constraints {
-        perimeter: None,
-        ..held
-    })
-    .unwrap();
+    hold(&mut flow, None, held.volume).unwrap();
     for _ in 0..2 {
         let record = flow.advance(params.mcf_step).unwrap();
         assert_eq!(record.start.kind, solver::StartKind::HalfGrid);
@@ -322,34 +291,22 @@ fn half_grids_are_held_too() {
 fn targets_that_cannot_be_are_refused() {
     let u = ball(plane(), 0.2);
     let mut flow = free(&u);
-    let refused = |flow: &mut WillmoreFlow<2>, perimeter, volume| {
-        flow.constrain(Constraints { perimeter, volume })
-            .unwrap_err()
-    };
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = refused(&mut flow, Some(value), None);
+        let error = hold(&mut flow, Some(value), None).unwrap_err();
         assert!(matches!(error, Error::Geometry(_)), "{error}");
     }
-    let error = refused(&mut flow, None, Some(1.0));
+    let error = hold(&mut flow, None, Some(1.0)).unwrap_err();
     assert!(matches!(error, Error::VolumeTooLarge { .. }), "{error}");
-    let error = refused(&mut flow, Some(1.0), Some(0.1));
+    let error = hold(&mut flow, Some(1.0), Some(0.1)).unwrap_err();
     assert!(matches!(error, Error::PerimeterTooSmall { .. }), "{error}");
     assert!(error.to_string().contains("reduced volume"), "{error}");
     // A disc is as round as can be, and a strip across the box has a shorter boundary than a large disc.
     flow.constrain(Constraints::keeping(&u, params(&plane()).eps).unwrap())
         .unwrap();
-    flow.constrain(Constraints {
-        perimeter: Some(2.1),
-        volume: Some(0.5),
-    })
-    .unwrap();
+    hold(&mut flow, Some(2.1), Some(0.5)).unwrap();
 
     // What cannot be reached in a step leaves the flow where it was.
-    flow.constrain(Constraints {
-        perimeter: Some(40.0),
-        volume: None,
-    })
-    .unwrap();
+    hold(&mut flow, Some(40.0), None).unwrap();
     let before = flow.field().unwrap();
     let error = flow.advance(plane().spacing().powi(2)).unwrap_err();
     assert!(

@@ -30,8 +30,14 @@ fn flow(newton: NewtonParams) -> WillmoreFlow<2> {
     WillmoreFlow::with_network(&network(), &ball(grid(), RADIUS), params, &device()).unwrap()
 }
 
+/// The records of steps, without the wall times, which no two runs share.
 fn steps(flow: &mut WillmoreFlow<2>, count: usize) -> Vec<StepRecord> {
-    (0..count).map(|_| flow.advance(TAU).unwrap()).collect()
+    let step = |_| StepRecord {
+        seconds: 0.0,
+        times: PhaseTimes::default(),
+        ..flow.advance(TAU).unwrap()
+    };
+    (0..count).map(step).collect()
 }
 
 #[test]
@@ -181,24 +187,12 @@ fn the_same_input_gives_the_same_bytes_on_any_number_of_threads() {
     // Large enough for the parallel transforms.
     let grid = Grid::<2>::per_unit(128, 1.5).unwrap();
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
             let start = ball(grid, RADIUS);
             let mut flow =
                 WillmoreFlow::with_network(&network(), &start, params(&grid), &device()).unwrap();
-            let record = flow.advance(TAU).unwrap();
-            let values = flow.field().unwrap().into_values();
-            (
-                values,
-                StepRecord {
-                    seconds: 0.0,
-                    times: PhaseTimes::default(),
-                    ..record
-                },
-            )
+            (steps(&mut flow, 1), flow.field().unwrap())
         })
     };
     let first = run(2);
@@ -232,15 +226,7 @@ fn a_restored_flow_continues_with_the_same_bytes() {
     let mut restored = flow(NewtonParams::default());
     restored.restore(&state).unwrap();
     assert_eq!((restored.steps(), restored.time()), (2, whole.time()));
-    let without_time = |mut records: Vec<StepRecord>| {
-        for record in &mut records {
-            record.seconds = 0.0;
-            record.times = PhaseTimes::default();
-        }
-        records
-    };
-    let expected = without_time(steps(&mut whole, 2));
-    assert_eq!(without_time(steps(&mut restored, 2)), expected);
+    assert_eq!(steps(&mut restored, 2), steps(&mut whole, 2));
     assert_eq!(restored.field().unwrap(), whole.field().unwrap());
     let other = Grid::<2>::per_unit(128, 0.5).unwrap();
     let mut foreign = state;
@@ -295,25 +281,13 @@ fn unusable_input_is_refused_with_its_numbers() {
     let mut field = ball(grid(), RADIUS);
     field.values_mut()[77] = f64::NAN;
     let error = open(&field, fitting);
-    assert!(
-        matches!(
-            error,
-            Error::NonFinite {
-                step: 0,
-                field: "phase field"
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, Error::NonFinite { step: 0, .. }), "{error}");
+    assert!(error.to_string().contains("phase field"), "{error}");
 
     let field = ball(grid(), RADIUS);
-    let error = open(
-        &field,
-        FlowParams {
-            eps: 2.0 * fitting.eps,
-            ..fitting
-        },
-    );
+    let mut wide = fitting;
+    wide.eps *= 2.0;
+    let error = open(&field, wide);
     let message = error.to_string();
     assert!(
         matches!(error, Error::Model(model::Error::Mismatch { .. })),
@@ -376,13 +350,8 @@ impl MeanCurvatureStep<2> for Pointwise {
 #[test]
 fn any_step_of_mean_curvature_flow_will_do() {
     let start = ball(grid(), RADIUS);
-    let params = FlowParams {
-        newton: NewtonParams {
-            tolerance: 1e-6,
-            ..Default::default()
-        },
-        ..params(&grid())
-    };
+    let mut params = params(&grid());
+    params.newton.tolerance = 1e-6;
     let mut flow =
         WillmoreFlow::new(Pointwise { logarithm: false }, &start, params, &device()).unwrap();
     let tau = 100.0 * params.mcf_step * params.mcf_step;
@@ -400,16 +369,8 @@ fn any_step_of_mean_curvature_flow_will_do() {
         .unwrap()
         .advance(tau)
         .unwrap_err();
-    assert!(
-        matches!(
-            error,
-            Error::NonFinite {
-                step: 1,
-                field: "energy"
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, Error::NonFinite { step: 1, .. }), "{error}");
+    assert!(error.to_string().contains("energy"), "{error}");
 }
 
 #[test]

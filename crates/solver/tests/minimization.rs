@@ -212,37 +212,15 @@ fn energies_that_are_not_finite_are_reported() {
 
 #[test]
 fn settings_out_of_range_are_named() {
-    let bad = [
-        (
-            "tolerance",
-            NewtonParams {
-                tolerance: 0.0,
-                ..NewtonParams::default()
-            },
-        ),
-        (
-            "cg_tolerance",
-            NewtonParams {
-                cg_tolerance: f64::NAN,
-                ..NewtonParams::default()
-            },
-        ),
-        (
-            "cg_iterations",
-            NewtonParams {
-                cg_iterations: 0,
-                ..NewtonParams::default()
-            },
-        ),
-        (
-            "newton_iterations",
-            NewtonParams {
-                newton_iterations: 0,
-                ..NewtonParams::default()
-            },
-        ),
+    let bad: [(&str, fn(&mut NewtonParams)); 4] = [
+        ("tolerance", |params| params.tolerance = 0.0),
+        ("cg_tolerance", |params| params.cg_tolerance = f64::NAN),
+        ("cg_iterations", |params| params.cg_iterations = 0),
+        ("newton_iterations", |params| params.newton_iterations = 0),
     ];
-    for (expected, params) in bad {
+    for (expected, spoil) in bad {
+        let mut params = NewtonParams::default();
+        spoil(&mut params);
         let mut energy = Quadratic::random(1.0);
         let start = grid_tensor(&energy.a);
         let error = minimize(&mut energy, &start, &start, params, &device()).unwrap_err();

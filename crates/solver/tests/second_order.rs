@@ -1,10 +1,9 @@
 //! Time steps of second order: their order, their estimates, and what is not accepted.
 
-use crate::common::{device, ratios};
+use crate::common::{accurate, device, params};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Ellipse, Torus};
 use geometry::{Field, Grid, SignedDistance, phase_field};
-use model::Shipped;
 use solver::{Error, FlowParams, NewtonParams, StepRecord, WillmoreFlow};
 
 /// `2^-14`, the time step of the paper's experiments in 2D.
@@ -21,12 +20,11 @@ fn newton() -> NewtonParams {
 
 fn flow_of<const D: usize>(cells: usize, shape: &impl SignedDistance<D>) -> WillmoreFlow<D> {
     let grid = Grid::per_unit(cells, 1.0).unwrap();
-    let network = Shipped::Accurate.find(ratios(D)).unwrap();
+    let network = accurate(D);
     let params = FlowParams {
-        eps: 2.0 * grid.spacing(),
-        mcf_step: grid.spacing().powi(2),
         newton: newton(),
         calibration: network.calibration().unwrap().factors,
+        ..params(&grid)
     };
     let start = phase_field(grid, shape, params.eps).unwrap();
     WillmoreFlow::with_network(&network, &start, params, &device()).unwrap()
@@ -94,9 +92,9 @@ fn the_order_is_two_in_the_plane() {
     );
 }
 
-fn errors_in_space(shape: &impl SignedDistance<3>, halvings: u32) -> Vec<f64> {
+fn errors_in_space(shape: &impl SignedDistance<3>) -> Vec<f64> {
     let mut flow = flow_of(32, shape);
-    time_errors(&mut flow, 4.0 * UNIT, halvings, |flow, tau| {
+    time_errors(&mut flow, 4.0 * UNIT, 2, |flow, tau| {
         step(flow, tau);
     })
 }
@@ -105,7 +103,7 @@ fn errors_in_space(shape: &impl SignedDistance<3>, halvings: u32) -> Vec<f64> {
 fn the_order_is_two_in_space() {
     let profile = Ellipse::new([0.3, 0.2]).unwrap();
     let spheroid = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
-    let errors = errors_in_space(&spheroid, 2);
+    let errors = errors_in_space(&spheroid);
     let order = mean_order(&errors);
     assert!((order - 2.0).abs() < 0.15, "{order}: {errors:?}");
 }
@@ -113,7 +111,7 @@ fn the_order_is_two_in_space() {
 /// The radius of the tube is 2.4 interface widths: too little for displacements to be exact.
 #[test]
 fn the_order_is_nearly_two_for_thin_tubes() {
-    let errors = errors_in_space(&Torus::new(0.26, 0.15).unwrap(), 2);
+    let errors = errors_in_space(&Torus::new(0.26, 0.15).unwrap());
     let order = mean_order(&errors);
     assert!((order - 2.0).abs() < 0.3, "{order}: {errors:?}");
 }

@@ -5,7 +5,7 @@ use geometry::measure::l2_distance;
 use geometry::shapes::Cross;
 use geometry::{Field, Grid, phase_field};
 use model::{Network, Ratios, Shipped};
-use solver::{Error, Factors, FlowParams, NewtonParams, StartKind, StepRecord, WillmoreFlow};
+use solver::{Error, FlowParams, StartKind, StepRecord, WillmoreFlow};
 
 const EPS: f64 = 1.0 / 64.0;
 /// Both time steps.
@@ -17,22 +17,14 @@ fn grid() -> Grid<2> {
 
 fn scales(network: &Network) -> FlowParams {
     FlowParams {
-        eps: EPS,
-        mcf_step: TAU,
-        newton: NewtonParams::default(),
         calibration: network.calibration().unwrap().factors,
+        ..FlowParams::paper(EPS, TAU)
     }
 }
 
 fn ratios(n: usize, width: usize) -> Ratios {
     let grid = Grid::<2>::per_unit(n, 0.75).unwrap();
-    let plain = FlowParams {
-        eps: EPS,
-        mcf_step: TAU,
-        newton: NewtonParams::default(),
-        calibration: Factors::PAPER,
-    };
-    plain.ratios(&grid, width)
+    FlowParams::paper(EPS, TAU).ratios(&grid, width)
 }
 
 fn accurate(n: usize, width: usize) -> Network {

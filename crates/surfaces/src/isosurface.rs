@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use geometry::{PhaseField, distances_from_phase_field};
+use geometry::{PhaseField, check_values, distances_from_phase_field};
 use rayon::prelude::*;
 
 use crate::vector::Vector;
@@ -57,14 +57,7 @@ pub fn isosurface(s: &impl PhaseField<3>) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// [`geometry::Error::ValueCount`], [`geometry::Error::NonFinite`]; [`Error::TooLarge`].
 pub fn lattice_surface(size: [usize; 3], values: &[f64]) -> Result<TriangleMesh, Error> {
-    let (expected, actual) = (size.iter().product(), values.len());
-    if expected != actual {
-        return Err(geometry::Error::ValueCount { expected, actual }.into());
-    }
-    if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-        let value = values[index];
-        return Err(geometry::Error::NonFinite { index, value }.into());
-    }
+    check_values(values, size.iter().product())?;
     marched(&Lattice {
         size,
         value_at: &|[i, j, k]| values[(i * size[1] + j) * size[2] + k],

@@ -4,12 +4,19 @@
 
 use std::f64::consts::PI;
 
-use crate::common::{closed, cube, reversed, sphere, together, torus, translated};
+use crate::common::{closed, cube, reversed, sphere, together, topology, torus, translated};
 use geometry::{Grid, Placement};
 use surfaces::{ClosedMesh, Error, TriangleMesh, Warning};
 
 fn error(mesh: TriangleMesh) -> Error {
     ClosedMesh::new(mesh).unwrap_err()
+}
+
+/// Of a cube with something wrong.
+fn spoiled(spoil: fn(&mut TriangleMesh)) -> Error {
+    let mut mesh = cube(0.5);
+    spoil(&mut mesh);
+    error(mesh)
 }
 
 #[track_caller]
@@ -25,27 +32,18 @@ fn measures_are_those_of_the_solid() {
     let mesh = closed(translated(cube(0.5), [100.0, 200.0, -300.0]));
     near(mesh.area(), 6.0, 1e-12);
     near(mesh.volume(), 1.0, 1e-12);
-    assert_eq!(
-        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
-        (2, 1, 0)
-    );
+    assert_eq!(topology(&mesh), (2, 1, 0));
     assert_eq!(mesh.bounding_box().extent(), [1.0; 3]);
     assert_eq!(mesh.bounding_box().centre(), [100.0, 200.0, -300.0]);
 
     let mesh = closed(torus(0.5, 0.2, 400, 200));
     near(mesh.area(), 4.0 * PI * PI * 0.5 * 0.2, 2e-3);
     near(mesh.volume(), 2.0 * PI * PI * 0.5 * 0.04, 2e-4);
-    assert_eq!(
-        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
-        (0, 1, 1)
-    );
+    assert_eq!(topology(&mesh), (0, 1, 1));
 
     let both = together(torus(0.5, 0.2, 20, 20), &sphere([2.0, 0.0, 0.0], 0.3, 2));
     let mesh = closed(both);
-    assert_eq!(
-        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
-        (2, 2, 1)
-    );
+    assert_eq!(topology(&mesh), (2, 2, 1));
 }
 
 #[test]
@@ -155,9 +153,7 @@ fn collapsed_faces_are_left_out() {
 
 #[test]
 fn open_meshes_are_refused() {
-    let mut mesh = cube(0.5);
-    mesh.faces.remove(4);
-    let error = error(mesh);
+    let error = spoiled(|mesh| _ = mesh.faces.remove(4));
     assert!(matches!(error, Error::Open { edges: 3, .. }), "{error}");
     assert!(
         error
@@ -181,9 +177,7 @@ fn crowded_and_mixed_edges_are_refused() {
         }
     ));
 
-    let mut mesh = cube(0.5);
-    mesh.faces[5].swap(0, 1);
-    let error = error(mesh);
+    let error = spoiled(|mesh| mesh.faces[5].swap(0, 1));
     assert!(
         matches!(error, Error::MixedOrientation { edges: 3, .. }),
         "{error}"
@@ -197,28 +191,24 @@ fn crowded_and_mixed_edges_are_refused() {
 #[test]
 fn meshes_without_sense_are_refused() {
     assert!(matches!(error(TriangleMesh::default()), Error::NoFaces));
-    let mut mesh = cube(0.5);
-    mesh.faces[3][1] = 8;
+    let wrong = spoiled(|mesh| mesh.faces[3][1] = 8);
     assert!(matches!(
-        error(mesh),
+        wrong,
         Error::IndexOutOfRange {
             face: 3,
             vertex: 8,
             vertices: 8
         }
     ));
-    for bad in [f64::NAN, f64::INFINITY] {
-        let mut mesh = cube(0.5);
-        mesh.vertices[6][2] = bad;
-        assert!(matches!(
-            error(mesh),
-            Error::NonFiniteVertex { vertex: 6, .. }
-        ));
+    for wrong in [
+        spoiled(|mesh| mesh.vertices[6][2] = f64::NAN),
+        spoiled(|mesh| mesh.vertices[6][2] = f64::INFINITY),
+    ] {
+        assert!(matches!(wrong, Error::NonFiniteVertex { vertex: 6, .. }));
     }
-    let mut mesh = cube(0.5);
-    mesh.normals = Some(vec![[1.0, 0.0, 0.0]; 7]);
+    let wrong = spoiled(|mesh| mesh.normals = Some(vec![[1.0, 0.0, 0.0]; 7]));
     assert!(matches!(
-        error(mesh),
+        wrong,
         Error::Normals {
             normals: 7,
             vertices: 8,

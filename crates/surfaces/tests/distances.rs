@@ -5,49 +5,30 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::common::{Numbers, closed, cube, reversed, sphere, together, torus, translated};
+use crate::common::{
+    Numbers, Vector, closed, cross, cube, dot, length, minus, reversed, sphere, together, torus,
+    translated,
+};
 use geometry::shapes::{self, Ball};
 use geometry::{Bricks, Field, Grid, Nodes, PhaseField, Placement, SignedDistance, Stored};
 use surfaces::{ClosedMesh, MeshDistance, mend_signs, samples};
 
-type Point = [f64; 3];
-
-fn sub(a: Point, b: Point) -> Point {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn length(a: Point) -> f64 {
-    dot(a, a).sqrt()
-}
-
 /// Distance to a segment.
-fn to_segment(x: Point, [a, b]: [Point; 2]) -> f64 {
-    let (ab, ax) = (sub(b, a), sub(x, a));
+fn to_segment(x: Vector, [a, b]: [Vector; 2]) -> f64 {
+    let (ab, ax) = (minus(b, a), minus(x, a));
     let along = (dot(ax, ab) / dot(ab, ab)).clamp(0.0, 1.0);
     length(std::array::from_fn(|i| ax[i] - along * ab[i]))
 }
 
 /// Distance to a triangle: to its plane over the inside, else to the nearest side.
-fn to_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let normal = cross(sub(b, a), sub(c, a));
+fn to_triangle(x: Vector, [a, b, c]: [Vector; 3]) -> f64 {
+    let normal = cross(minus(b, a), minus(c, a));
     let sides = [[a, b], [b, c], [c, a]];
     if sides
         .iter()
-        .all(|&[p, q]| dot(cross(sub(q, p), sub(x, p)), normal) >= 0.0)
+        .all(|&[p, q]| dot(cross(minus(q, p), minus(x, p)), normal) >= 0.0)
     {
-        dot(sub(x, a), normal).abs() / length(normal)
+        dot(minus(x, a), normal).abs() / length(normal)
     } else {
         sides
             .into_iter()
@@ -57,9 +38,9 @@ fn to_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
 }
 
 /// Solid angle over `4 pi`, summed: 1 inside, 0 outside.
-fn winding_number(x: Point, triangles: &[[Point; 3]]) -> f64 {
-    let angle = |triangle: &[Point; 3]| {
-        let [a, b, c] = triangle.map(|v| sub(v, x));
+fn winding_number(x: Vector, triangles: &[[Vector; 3]]) -> f64 {
+    let angle = |triangle: &[Vector; 3]| {
+        let [a, b, c] = triangle.map(|v| minus(v, x));
         let [la, lb, lc] = [a, b, c].map(length);
         let denominator = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
         2.0 * dot(a, cross(b, c)).atan2(denominator)
@@ -71,7 +52,7 @@ fn winding_number(x: Point, triangles: &[[Point; 3]]) -> f64 {
 /// Returns the largest error.
 fn compare(name: &str, mesh: &ClosedMesh, points: usize) -> f64 {
     let vertices = &mesh.mesh().vertices;
-    let triangles: Vec<[Point; 3]> = mesh
+    let triangles: Vec<[Vector; 3]> = mesh
         .mesh()
         .faces
         .iter()
@@ -97,7 +78,7 @@ fn compare(name: &str, mesh: &ClosedMesh, points: usize) -> f64 {
                 3 => [0.4, 0.6, 0.0],
                 _ => [0.3, 0.3, 0.4],
             };
-            let foot: Point =
+            let foot: Vector =
                 std::array::from_fn(|i| (0..3).map(|k| weights[k] * triangle[k][i]).sum());
             let reach = side * 10_f64.powf(-1.0 - 4.0 * numbers.next());
             numbers.point(foot.map(|v| v - reach), foot.map(|v| v + reach))

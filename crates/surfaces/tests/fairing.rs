@@ -5,9 +5,9 @@
 use chacha20::ChaCha8Rng;
 use geometry::{Grid, Placement, optimal_profile};
 use rand::{RngExt, SeedableRng};
-use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh, decode, rewrite};
+use surfaces::{Fairing, MeshDistance, TriangleMesh, decode, rewrite};
 
-use crate::common::{cube, sphere, torus};
+use crate::common::{closed, cube, length, sphere, torus};
 
 /// Normally distributed noise of this standard deviation along the normals.
 fn with_noise(mesh: &TriangleMesh, deviation: f64) -> TriangleMesh {
@@ -21,9 +21,9 @@ fn with_noise(mesh: &TriangleMesh, deviation: f64) -> TriangleMesh {
 }
 
 fn radii(mesh: &TriangleMesh) -> (f64, f64) {
-    let radius = |x: &[f64; 3]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let mean = mesh.vertices.iter().map(radius).sum::<f64>() / mesh.vertices.len() as f64;
-    let off = mesh.vertices.iter().map(|x| (radius(x) - mean).powi(2));
+    let radii = mesh.vertices.iter().map(|x| length(*x));
+    let mean = radii.clone().sum::<f64>() / mesh.vertices.len() as f64;
+    let off = radii.map(|radius| (radius - mean).powi(2));
     (mean, (off.sum::<f64>() / mesh.vertices.len() as f64).sqrt())
 }
 
@@ -127,17 +127,12 @@ fn the_volume_is_made_what_it_should_be() {
 fn vertices_follow_a_sphere_that_grows() {
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
-    let field = |radius: f64| {
-        geometry::Field::from_fn(grid, |x| {
-            let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-            optimal_profile(r - radius, eps)
-        })
-    };
+    let field =
+        |radius: f64| geometry::Field::from_fn(grid, |x| optimal_profile(length(x) - radius, eps));
     let mut mesh = sphere([0.0; 3], 1.0, 4);
     // A thorn of which the grid knows nothing.
     mesh.vertices[0] = mesh.vertices[0].map(|x| 1.4 * x);
-    let (closed, _) = ClosedMesh::new(mesh).unwrap();
-    let fairing = Fairing::new(closed, 0.0, |x| x[2] < -0.9);
+    let fairing = Fairing::new(closed(mesh), 0.0, |x| x[2] < -0.9);
     // The radius 1 of the mesh is 0.3 in the box.
     let placement = Placement::about([0.0; 3], 0.3).unwrap();
     let followed = fairing.follow(placement, &field(0.3), eps).unwrap();
@@ -145,7 +140,7 @@ fn vertices_follow_a_sphere_that_grows() {
     assert_eq!(followed.left_behind(&grown).unwrap(), 0.0);
     let moved = fairing.faired(&followed, &grown).unwrap();
     for (vertex, x) in moved.vertices.iter().enumerate() {
-        let radius = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let radius = length(*x);
         let expected = match vertex {
             0 => 1.5,
             _ if fairing.kept[vertex] => 1.0,
@@ -177,8 +172,7 @@ fn vertices_follow_a_sphere_that_grows() {
 fn a_fairing_takes_off_noise_before_the_flow_begins() {
     let noisy = with_noise(&sphere([0.0; 3], 0.3, 5), 0.003);
     let volume = noisy.volume();
-    let (closed, _) = ClosedMesh::new(noisy.clone()).unwrap();
-    let fairing = Fairing::new(closed, noisy.noise(), |_| false);
+    let fairing = Fairing::new(closed(noisy.clone()), noisy.noise(), |_| false);
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     let eps = 2.0 * grid.spacing();
     let placement = Placement::about([0.0; 3], 1.0).unwrap();
@@ -251,9 +245,7 @@ fn normals_stay_on_their_side() {
 #[test]
 fn ply_and_stl_files_keep_everything_but_positions_and_normals() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut closed, _) = ClosedMesh::new(cube(1.0))
-        .map(|(c, w)| (c.into_mesh(), w))
-        .unwrap();
+    let mut closed = closed(cube(1.0)).into_mesh();
     closed.normals = Some(closed.vertex_normals());
     for name in ["cube.ply", "cube.stl"] {
         let path = folder.path().join(name);

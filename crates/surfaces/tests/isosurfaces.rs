@@ -4,7 +4,7 @@
 
 use std::f64::consts::PI;
 
-use crate::common::Numbers;
+use crate::common::{Numbers, closed, dot, length, minus, rounded, topology, unit, waves};
 use geometry::shapes::{Ball, Cuboid, Torus};
 use geometry::{Field, Grid, PhaseField, SignedDistance, SignedDistanceExt, Stored, phase_field};
 use proptest::prelude::*;
@@ -12,14 +12,6 @@ use surfaces::{
     ClosedMesh, Error, MeshDistance, isosurface, lattice_surface, phase_field_surface,
     remeshed_surface, samples,
 };
-
-/// Every edge once in each direction, without mending anything.
-#[track_caller]
-fn closed(mesh: surfaces::TriangleMesh) -> ClosedMesh {
-    let (mesh, warnings) = ClosedMesh::new(mesh).unwrap();
-    assert_eq!(warnings, []);
-    mesh
-}
 
 fn surface(grid: Grid<3>, shape: &impl SignedDistance<3>) -> ClosedMesh {
     let eps = 2.0 * grid.spacing();
@@ -54,7 +46,8 @@ fn spheres_are_accurate_to_second_order() {
 
 #[test]
 fn vertices_and_normals_lie_on_the_sphere() {
-    let ball = Ball::new([0.011, -0.007, 0.003], 0.3).unwrap();
+    let centre = [0.011, -0.007, 0.003];
+    let ball = Ball::new(centre, 0.3).unwrap();
     let grid = Grid::<3>::centred(64, 1.0).unwrap();
     let h = grid.spacing();
     let mesh = surface(grid, &ball).into_mesh();
@@ -62,9 +55,7 @@ fn vertices_and_normals_lie_on_the_sphere() {
         // But for the clearance at nodes, third order: (h/r)^3 r/16 = 2.6e-6.
         let error = ball.signed_distance(*x).abs();
         assert!(error < 3e-6 + 1.8 * h / 1024.0, "{error} at {x:?}");
-        let exact = [x[0] - 0.011, x[1] + 0.007, x[2] - 0.003];
-        let length = exact.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let cosine: f64 = (0..3).map(|i| exact[i] / length * normal[i]).sum();
+        let cosine = dot(unit(minus(*x, centre)), normal);
         assert!((cosine - 1.0).abs() < 1e-4, "{cosine} at {x:?}");
     }
 }
@@ -74,17 +65,11 @@ fn euler_characteristics_are_right() {
     let grid = Grid::<3>::centred(48, 1.0).unwrap();
     let torus = Torus::new(0.3, 0.1).unwrap();
     let mesh = surface(grid, &torus);
-    assert_eq!(
-        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
-        (0, 1, 1)
-    );
+    assert_eq!(topology(&mesh), (0, 1, 1));
     let balls = Ball::new([-0.2, 0.0, 0.0], 0.15).unwrap();
     let balls = balls.union(Ball::new([0.2, 0.05, 0.0], 0.17).unwrap());
     let mesh = surface(grid, &balls);
-    assert_eq!(
-        (mesh.euler_characteristic(), mesh.components(), mesh.genus()),
-        (4, 2, 0)
-    );
+    assert_eq!(topology(&mesh), (4, 2, 0));
     let shell = Ball::new([0.0; 3], 0.4).unwrap();
     let shell = shell.difference(Ball::new([0.0; 3], 0.2).unwrap());
     let mesh = surface(grid, &shell);
@@ -290,17 +275,8 @@ proptest! {
         levels in prop::sample::select(vec![0.0, 0.5, 2.0, 1e3]),
     ) {
         let grid = Grid::<3>::new(cells, 1.0).unwrap();
-        let mut numbers = Numbers(seed);
-        let waves: Vec<([f64; 3], f64, f64)> = (0..6)
-            .map(|_| (numbers.point([-9.0; 3], [9.0; 3]), 6.3 * numbers.next(), numbers.next()))
-            .collect();
-        let s = Field::from_fn(grid, |x| {
-            let wave = |(k, phase, amplitude): &([f64; 3], f64, f64)| {
-                amplitude * (k[0] * x[0] + k[1] * x[1] + k[2] * x[2] + phase).sin()
-            };
-            let s: f64 = waves.iter().map(wave).sum();
-            if levels > 0.0 { (s * levels).round() / levels } else { s }
-        });
+        let waves = waves(seed);
+        let s = Field::from_fn(grid, |x| rounded(waves(x), levels));
         let mesh = isosurface(&s).unwrap();
         if !mesh.faces.is_empty() {
             let mesh = closed(mesh);
@@ -362,16 +338,14 @@ fn relaxed_surfaces_keep_their_volume_and_their_place() {
     });
     let rough = isosurface(&steps).unwrap();
     let (reach, volume) = (0.5 / 32.0, 0.11);
-    let smooth = rough.relaxed(20, volume, |_, way| {
-        let length = way.iter().map(|v| v * v).sum::<f64>().sqrt();
-        (reach / length).min(1.0)
-    });
+    let smooth = rough.relaxed(20, volume, |_, way| (reach / length(way)).min(1.0));
     let [before, after] = [rough.clone(), smooth.clone()].map(closed);
     assert!((after.volume() / volume - 1.0).abs() < 1e-12);
     assert!(after.area() < 0.9 * before.area());
     let pairs = rough.vertices.iter().zip(&smooth.vertices);
-    let ways = pairs.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
-    let gone = ways.fold(0.0, f64::max).sqrt();
+    let gone = pairs
+        .map(|(a, b)| length(minus(*a, *b)))
+        .fold(0.0, f64::max);
     // The last move to the volume comes on top.
     assert!(gone < 1.2 * reach, "{gone} {reach}");
 }

@@ -3,38 +3,15 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use crate::common::{Numbers, closed};
+use crate::common::{
+    Numbers, Vector, closed, cross, dot, length, minus, rounded, topology, unit, waves,
+};
 use geometry::shapes::{Ball, Capsule, Cuboid, Torus};
 use geometry::{Field, Grid, SignedDistance, SignedDistanceExt, optimal_profile, phase_field};
 use proptest::prelude::*;
 use surfaces::{
     ClosedMesh, Error, MeshDistance, TriangleMesh, phase_field_surface, remeshed_surface, samples,
 };
-
-type Vector = [f64; 3];
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
-}
-
-fn length(a: Vector) -> f64 {
-    dot(a, a).sqrt()
-}
-
-fn unit(a: Vector) -> Vector {
-    a.map(|x| x / length(a))
-}
 
 fn triangles(mesh: &TriangleMesh) -> impl Iterator<Item = [Vector; 3]> {
     let corners = |face: &[u32; 3]| face.map(|v| mesh.vertices[v as usize]);
@@ -69,7 +46,6 @@ pub fn shortest_edge(mesh: &TriangleMesh) -> f64 {
 fn both(u: &Field<3>, eps: f64) -> [ClosedMesh; 2] {
     let [marched, remeshed] =
         [phase_field_surface(u, eps), remeshed_surface(u, eps)].map(|mesh| closed(mesh.unwrap()));
-    let topology = |mesh: &ClosedMesh| (mesh.components(), mesh.euler_characteristic());
     assert_eq!(topology(&remeshed), topology(&marched));
     [marched, remeshed]
 }
@@ -291,8 +267,7 @@ fn fields_without_a_smooth_surface_stay_closed() {
     let grid = Grid::<3>::centred(12, 1.0).unwrap();
     let mut numbers = Numbers(5);
     for levels in [1.0, 2.0, 1e3] {
-        let values =
-            (0..grid.len()).map(|_| ((2.0 * numbers.next() - 1.4) * levels).round() / levels);
+        let values = (0..grid.len()).map(|_| rounded(2.0 * numbers.next() - 1.4, levels));
         let u = Field::from_values(grid, values.collect()).unwrap();
         both(&u.map(|u| u.clamp(-1.0, 1.0)), 2.0 * grid.spacing());
     }
@@ -304,11 +279,8 @@ fn the_number_of_threads_changes_nothing() {
     let eps = 2.0 * grid.spacing();
     let u = phase_field(grid, &Torus::new(0.27, 0.1).unwrap(), eps).unwrap();
     let by = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| remeshed_surface(&u, eps).unwrap())
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| remeshed_surface(&u, eps).unwrap())
     };
     assert_eq!(by(1), by(3));
 }
@@ -342,17 +314,8 @@ proptest! {
         levels in prop::sample::select(vec![0.0, 2.0]),
     ) {
         let grid = Grid::<3>::new(cells, 1.0).unwrap();
-        let mut numbers = Numbers(seed);
-        let waves: Vec<([f64; 3], f64, f64)> = (0..6)
-            .map(|_| (numbers.point([-9.0; 3], [9.0; 3]), 6.3 * numbers.next(), numbers.next()))
-            .collect();
-        let u = Field::from_fn(grid, |x| {
-            let wave = |(k, phase, amplitude): &([f64; 3], f64, f64)| {
-                amplitude * (dot(*k, x) + phase).sin()
-            };
-            let u = waves.iter().map(wave).sum::<f64>().tanh();
-            if levels > 0.0 { (u * levels).round() / levels } else { u }
-        });
+        let waves = waves(seed);
+        let u = Field::from_fn(grid, |x| rounded(waves(x).tanh(), levels));
         let eps = 2.0 * grid.spacing();
         if !phase_field_surface(&u, eps).unwrap().faces.is_empty() {
             both(&u, eps);

@@ -2,6 +2,7 @@
 
 use surfaces::{ClosedMesh, TriangleMesh, repair, samples};
 
+use crate::common::{length, minus, reversed, together, translated};
 use crate::remeshing::{shortest_edge, smallest_angles};
 
 /// The mesh without the faces whose centres are near a point.
@@ -15,7 +16,7 @@ fn with_hole(mesh: &TriangleMesh, at: [f64; 3], radius: f64) -> TriangleMesh {
                 .sum::<f64>()
                 / 3.0
         });
-        (0..3).map(|i| (centre[i] - at[i]).powi(2)).sum::<f64>() > radius * radius
+        length(minus(centre, at)) > radius
     });
     assert!(open.faces.len() < mesh.faces.len());
     open
@@ -24,13 +25,11 @@ fn with_hole(mesh: &TriangleMesh, at: [f64; 3], radius: f64) -> TriangleMesh {
 /// A sphere of radius 0.4.
 fn sphere() -> TriangleMesh {
     let grid = geometry::Grid::<3>::centred(32, 1.0).unwrap();
-    let radius = |x: [f64; 3]| x[0].hypot(x[1]).hypot(x[2]) - 0.4;
-    surfaces::isosurface(&geometry::Field::from_fn(grid, radius)).unwrap()
+    surfaces::isosurface(&geometry::Field::from_fn(grid, |x| length(x) - 0.4)).unwrap()
 }
 
 fn radii(mesh: &ClosedMesh) -> (f64, f64) {
-    let radius = |x: &[f64; 3]| x[0].hypot(x[1]).hypot(x[2]);
-    let radii = mesh.mesh().vertices.iter().map(radius);
+    let radii = mesh.mesh().vertices.iter().map(|x| length(*x));
     radii.fold((f64::MAX, 0.0), |(low, high), r| (low.min(r), high.max(r)))
 }
 
@@ -64,25 +63,12 @@ fn faces_of_mixed_orientation_agree() {
     let (low, high) = radii(&repaired.mesh);
     assert!(low > 0.39 && high < 0.41, "{low} {high}");
     // Inside out as a whole, too.
-    for face in &mut mixed.faces {
-        face.swap(0, 1);
-    }
-    assert!(repair(&mixed, 48).unwrap().mesh.volume() > 0.2);
+    assert!(repair(&reversed(mixed), 48).unwrap().mesh.volume() > 0.2);
 }
 
 #[test]
 fn what_crosses_itself_becomes_one() {
-    let mut two = sphere();
-    two.normals = None;
-    let (count, faces) = (two.vertices.len() as u32, two.faces.clone());
-    let moved: Vec<_> = two
-        .vertices
-        .iter()
-        .map(|x| [x[0] + 0.3, x[1], x[2]])
-        .collect();
-    two.vertices.extend(moved);
-    two.faces
-        .extend(faces.iter().map(|face| face.map(|v| v + count)));
+    let two = together(sphere(), &translated(sphere(), [0.3, 0.0, 0.0]));
     let repaired = repair(&two, 64).unwrap();
     assert_eq!((repaired.mesh.components(), repaired.mesh.genus()), (1, 0));
     // Two balls of radius r at a distance d have 4/3 pi r^3 + pi r^2 d - pi d^3 / 12 together.
@@ -101,14 +87,8 @@ fn what_crosses_itself_becomes_one() {
 fn creases_have_neither_slivers_nor_short_edges() {
     let lever = samples::lever(96).unwrap();
     for (cells, shift) in [(112, [0.05, 0.02, 0.03]), (64, [0.048, -0.015, 0.019])] {
-        let mut two = lever.mesh().clone();
-        two.normals = None;
-        let count = two.vertices.len() as u32;
-        let moved =
-            (lever.mesh().vertices.iter()).map(|x| std::array::from_fn(|i| x[i] + shift[i]));
-        two.vertices.extend(moved);
-        let faces = lever.mesh().faces.iter();
-        two.faces.extend(faces.map(|face| face.map(|v| v + count)));
+        let lever = lever.mesh();
+        let two = together(lever.clone(), &translated(lever.clone(), shift));
         let repaired = repair(&two, cells).unwrap();
         let mesh = repaired.mesh.mesh();
         let smallest = smallest_angles(mesh)[0];

@@ -1,9 +1,6 @@
 //! Small cases.
 
-use engine::{
-    Case, Flow, Held, Helfrich, Measure, Method, Operator, Run, Scales, Scheme, StepRule, Stop,
-    TimeSteps,
-};
+use engine::{Case, Flow, Measure, Method, Operator, Run, Scales, Scheme, StepRule, TimeSteps};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, phase_field};
 use model::Networks;
@@ -28,10 +25,7 @@ pub fn scales() -> Scales {
 }
 
 pub fn grid(n: usize) -> Grid<2> {
-    Grid::per_unit(n, 0.75)
-        .unwrap()
-        .with_origin([-0.375; 2])
-        .unwrap()
+    Grid::per_unit(n, 0.75).unwrap()
 }
 
 pub fn disc(n: usize, radius: f64) -> Field<2> {
@@ -55,26 +49,17 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
     );
     let mut measures = Measure::size(EPS);
     measures.extend(Measure::crossings(0.0));
+    let steps = (StepRule::Constant(TAU), 4);
     Case {
-        shape: "shape".to_owned(),
-        initial: initial.into(),
-        region: None,
-        energy: Helfrich::default(),
-        held: Held::default(),
         flow,
-        operator: operator.unwrap(),
-        scales: scales(),
-        steps: StepRule::Constant(TAU).into(),
-        stops: vec![Stop::Steps(4)],
         measures,
+        ..Case::willmore("shape", initial, operator.unwrap(), scales(), steps)
     }
 }
 
 /// Steps made in substeps, the first one at most of this size.
 pub fn divided(tau: f64, first: f64) -> TimeSteps {
     TimeSteps {
-        longest_move: None,
-        rule: StepRule::Constant(tau),
         first_substep: Some(first),
         ..StepRule::Constant(tau).into()
     }

@@ -306,18 +306,12 @@ pub fn refine_kernel(kernel: &[f64], dimension: usize, width: usize) -> (Vec<f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ratios;
     use crate::training::levenberg_marquardt::heat_kernel;
+    use crate::training::tests::{losses_of_resumed, ratios};
 
     fn data(dimension: usize) -> SphereData {
-        let ratios = Ratios {
-            dimension,
-            width: 9,
-            eps_over_h: 2.0,
-            step_over_h2: 1.0,
-        };
         SphereData {
-            ratios,
+            ratios: ratios(dimension, 9),
             cells: 32,
             radii: [0.2, 0.3],
             count: 4,
@@ -335,36 +329,12 @@ mod tests {
 
     #[test]
     fn resumes_with_the_same_bytes_and_lowers_the_loss() {
-        let device = ComputeDevice::default_compiled().unwrap();
         for dimension in [2, 3] {
             let mut data = data(dimension);
             data.cells = if dimension == 2 { 32 } else { 16 };
-            let run = |state, observer: &mut Observer<'_, AdamState>| {
-                params().train(&data, 3, state, &device, observer)
-            };
-            let mut losses = Vec::new();
-            let mut last = None;
-            let whole = run(None, &mut |p: &Progress, s: &AdamState| {
-                losses.push(p.held_out_loss);
-                last = Some(s.clone());
-                Ok(true)
-            })
-            .unwrap();
+            // Stopped after two epochs of the same schedule.
+            let losses = losses_of_resumed(&params(), &data, 3, 2);
             assert!(losses[3] < losses[0], "{dimension}D {losses:?}");
-            // Stopped after two epochs of the same schedule, then resumed.
-            let mut half = None;
-            let stopped = run(None, &mut |p: &Progress, s: &AdamState| {
-                half = Some(s.clone());
-                Ok(p.iteration < 2)
-            });
-            assert!(matches!(stopped, Err(Error::Interrupted { iteration: 2 })));
-            let mut resumed_last = None;
-            let resumed = run(half, &mut |_: &Progress, s: &AdamState| {
-                resumed_last = Some(s.clone());
-                Ok(true)
-            })
-            .unwrap();
-            assert_eq!((resumed, resumed_last), (whole, last));
         }
     }
 

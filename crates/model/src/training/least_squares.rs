@@ -372,15 +372,10 @@ impl Recipe for LeastSquaresParams {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::training::tests::ratios;
 
     fn data() -> SphereData {
-        let ratios = Ratios {
-            dimension: 2,
-            width: 17,
-            eps_over_h: 2.0,
-            step_over_h2: 1.0,
-        };
-        SphereData::new(ratios, 128).unwrap()
+        SphereData::new(ratios(2, 17), 128).unwrap()
     }
 
     #[test]

@@ -562,17 +562,11 @@ impl Recipe for LmParams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::Progress;
+    use crate::training::tests::{losses_of_resumed, ratios};
 
     fn data(dimension: usize) -> SphereData {
-        let ratios = Ratios {
-            dimension,
-            width: 9,
-            eps_over_h: 2.0,
-            step_over_h2: 1.0,
-        };
         SphereData {
-            ratios,
+            ratios: ratios(dimension, 9),
             cells: 64,
             radii: [0.1, 0.4],
             count: 8,
@@ -624,36 +618,12 @@ mod tests {
 
     #[test]
     fn training_lowers_the_loss_and_resumes_with_the_same_bytes() {
-        let device = ComputeDevice::default_compiled().unwrap();
         for dimension in [2, 3] {
-            let data = data(dimension);
-            let run = |state, observer: &mut Observer<'_, LmState>| {
-                params().train(&data, 2, state, &device, observer)
-            };
-            let (mut losses, mut last) = (Vec::new(), None);
-            let whole = run(None, &mut |p: &Progress, s: &LmState| {
-                losses.push(p.held_out_loss);
-                last = Some(s.clone());
-                Ok(true)
-            })
-            .unwrap();
+            let losses = losses_of_resumed(&params(), &data(dimension), 2, 3);
             assert!(
                 losses[losses.len() - 1] < 0.7 * losses[0],
                 "{dimension}D {losses:?}"
             );
-            let mut half = None;
-            let stopped = run(None, &mut |p: &Progress, s: &LmState| {
-                half = Some(s.clone());
-                Ok(p.iteration < 3)
-            });
-            assert!(matches!(stopped, Err(Error::Interrupted { iteration: 3 })));
-            let mut resumed_last = None;
-            let resumed = run(half, &mut |_: &Progress, s: &LmState| {
-                resumed_last = Some(s.clone());
-                Ok(true)
-            })
-            .unwrap();
-            assert_eq!((resumed, resumed_last), (whole, last));
         }
     }
 

@@ -49,3 +49,58 @@ impl Progress {
 /// Called after every iteration of a training: `Ok(false)` stops it with [`Error::Interrupted`], and an error, such as that of storing
 /// a checkpoint, ends it.
 pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + Send + 'a;
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Debug;
+
+    use operators::ComputeDevice;
+
+    use super::*;
+    use crate::Ratios;
+
+    /// The ratios for `eps = 2h` and `tautilde = h^2`.
+    pub(super) fn ratios(dimension: usize, width: usize) -> Ratios {
+        Ratios {
+            dimension,
+            width,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        }
+    }
+
+    /// The held-out losses of a training which goes on with the same bytes after it was stopped in this iteration.
+    pub(super) fn losses_of_resumed<R: Recipe>(
+        recipe: &R,
+        data: &SphereData,
+        seed: u64,
+        stop: usize,
+    ) -> Vec<f64>
+    where
+        R::State: PartialEq + Debug,
+    {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let run = |state: Option<R::State>, observer: &mut Observer<'_, R::State>| {
+            recipe.train(data, seed, state, &device, observer)
+        };
+        let (mut losses, mut last) = (Vec::new(), None);
+        let whole = run(None, &mut |p: &Progress, s: &R::State| {
+            losses.push(p.held_out_loss);
+            last = Some(s.clone());
+            Ok(true)
+        });
+        let mut half = None;
+        let stopped = run(None, &mut |p: &Progress, s: &R::State| {
+            half = Some(s.clone());
+            Ok(p.iteration < stop)
+        });
+        assert!(matches!(stopped, Err(Error::Interrupted { iteration }) if iteration == stop));
+        let mut resumed_last = None;
+        let resumed = run(half, &mut |_: &Progress, s: &R::State| {
+            resumed_last = Some(s.clone());
+            Ok(true)
+        });
+        assert_eq!((resumed.unwrap(), resumed_last), (whole.unwrap(), last));
+        losses
+    }
+}

@@ -182,12 +182,7 @@ mod tests {
     #[test]
     fn an_interrupted_training_goes_on_from_its_stored_checkpoint() {
         let device = ComputeDevice::default_compiled().unwrap();
-        let ratios = Ratios {
-            dimension: 2,
-            width: 9,
-            eps_over_h: 1.0,
-            step_over_h2: 0.25,
-        };
+        let ratios = Ratios::of_run(2, 9, 1.0, 1.0, 0.25);
         let training = Training {
             recipe: &LmParams::new(true),
             data: SphereData::new(ratios, 64).unwrap().quick(),

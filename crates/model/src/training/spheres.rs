@@ -252,16 +252,11 @@ pub(super) fn direction(dimension: usize, rho: f64, rng: &mut ChaCha8Rng) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::training::tests::ratios;
     use rand::SeedableRng;
 
     fn data(dimension: usize) -> SphereData {
-        let ratios = Ratios {
-            dimension,
-            width: 17,
-            eps_over_h: 2.0,
-            step_over_h2: 1.0,
-        };
-        SphereData::new(ratios, 128).unwrap()
+        SphereData::new(ratios(dimension, 17), 128).unwrap()
     }
 
     #[test]

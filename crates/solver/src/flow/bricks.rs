@@ -98,12 +98,4 @@ impl<const D: usize> WillmoreFlow<D> {
     pub(super) fn stored(&self, u: &Tensor<D>) -> Result<Stored<D>, Error> {
         stored(u, self.grid, self.active.as_ref(), &self.device)
     }
-
-    /// Refuses what active bricks cannot do.
-    pub(super) fn needs_grid(&self, what: &'static str) -> Result<(), Error> {
-        match &self.active {
-            Some(_) => Err(Error::NeedsGrid { what }),
-            None => Ok(()),
-        }
-    }
 }

@@ -41,8 +41,10 @@ impl<const D: usize> WillmoreFlow<D> {
     /// # Errors
     /// [`Error::Geometry`] if its grid is not the half of this one, or for another `eps` or `tautilde`.
     pub fn begin_on(&mut self, half: Self) -> Result<(), Error> {
-        self.needs_grid("starts on half grids")?;
-        half.needs_grid("starts on half grids")?;
+        if self.active.is_some() || half.active.is_some() {
+            let what = "starts on half grids";
+            return Err(Error::NeedsGrid { what });
+        }
         // The other grid's size and place are in the error.
         Field::constant(self.grid.half()?, 0.0)
             .zip_map(&Field::constant(half.grid, 0.0), |a, _| a)?;
@@ -168,11 +170,8 @@ impl<const D: usize> WillmoreFlow<D> {
             self.constraints.carried(&here, &there, self.params.eps)?
         };
         let record = match half.advance(tau) {
-            Ok(record) => record,
-            Err(Error::NotConverged { .. } | Error::NonFinite { .. } | Error::NotHeld { .. }) => {
-                return Ok(None);
-            }
-            Err(error) => return Err(error),
+            Err(error) if error.may_be_of_the_step_size() => return Ok(None),
+            record => record?,
         };
         let moved = download(&half.grid, &(half.current.clone() - from), &half.device)?;
         let share = half.grid.len() as f64 / self.grid.len() as f64;

@@ -6,24 +6,24 @@ use model::training::levenberg_marquardt::heat_kernel;
 use model::{Network, Ratios, Shipped};
 use operators::ComputeDevice;
 use rand::{RngExt, SeedableRng};
-use solver::{Error, FlowParams, NewtonParams, Objective};
+use solver::{Error, FlowParams, Objective};
 
 pub fn device() -> ComputeDevice {
     ComputeDevice::default_compiled().unwrap()
 }
 
 pub fn ratios(dimension: usize) -> Ratios {
-    Ratios {
-        dimension,
-        width: 17,
-        eps_over_h: 2.0,
-        step_over_h2: 1.0,
-    }
+    Ratios::of_run(dimension, 17, 1.0, 2.0, 1.0)
 }
 
 /// The shipped network with `n_K = 17`, `eps = 2h`, `tautilde = h^2`.
 pub fn network() -> Network {
     Shipped::Paper.find(ratios(2)).unwrap()
+}
+
+/// The accurate network for the same scales.
+pub fn accurate(dimension: usize) -> Network {
+    Shipped::Accurate.find(ratios(dimension)).unwrap()
 }
 
 /// A 3D operator that depends on no training in 3D: the heat kernel, with the activation of the 2D network.
@@ -36,12 +36,7 @@ pub fn network_3d() -> Network {
 
 /// The scales that fit the networks here.
 pub fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
-    FlowParams {
-        eps: 2.0 * grid.spacing(),
-        mcf_step: grid.spacing().powi(2),
-        newton: NewtonParams::default(),
-        calibration: solver::Factors::PAPER,
-    }
+    FlowParams::paper(2.0 * grid.spacing(), grid.spacing().powi(2))
 }
 
 pub fn ball<const D: usize>(grid: Grid<D>, radius: f64) -> Field<D> {
@@ -152,7 +147,20 @@ impl Quadratic {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// The remainders of an energy along a direction fall with the orders that these derivatives promise.
+pub fn passes_taylor_tests(
+    mut value: impl FnMut(f64) -> f64,
+    [first, second]: [f64; 2],
+    steps: &[f64],
+) {
+    for (derivatives, expected) in [(vec![first], 2.0), (vec![first, second], 3.0)] {
+        let rate = linearize::taylor::remainder(&mut value, &derivatives, steps, 1e-14).rate();
+        let rate = rate.unwrap();
+        assert!((rate - expected).abs() < 0.1, "{expected}: {rate}");
+    }
+}
+
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

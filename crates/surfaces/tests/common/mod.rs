@@ -5,6 +5,31 @@ pub mod files;
 
 use surfaces::{ClosedMesh, TriangleMesh};
 
+pub type Vector = [f64; 3];
+
+pub fn minus(a: Vector, b: Vector) -> Vector {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+pub fn cross(a: Vector, b: Vector) -> Vector {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
+}
+
+pub fn dot(a: Vector, b: Vector) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+pub fn length(a: Vector) -> f64 {
+    dot(a, a).sqrt()
+}
+
+pub fn unit(a: Vector) -> Vector {
+    a.map(|x| x / length(a))
+}
+
 pub fn cube(half: f64) -> TriangleMesh {
     let vertices =
         (0..8).map(|bits| [2, 1, 0].map(|axis| if bits >> axis & 1 == 1 { half } else { -half }));
@@ -68,11 +93,8 @@ pub fn sphere(centre: [f64; 3], radius: f64, levels: usize) -> TriangleMesh {
         corners = corners
             .into_iter()
             .flat_map(|[a, b, c]| {
-                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[p, q]| {
-                    let middle: [f64; 3] = std::array::from_fn(|i| p[i] + q[i]);
-                    let length = middle.iter().map(|v| v * v).sum::<f64>().sqrt();
-                    middle.map(|v| v / length)
-                });
+                let [ab, bc, ca] = [[a, b], [b, c], [c, a]]
+                    .map(|[p, q]| unit(std::array::from_fn(|i| p[i] + q[i])));
                 [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
             })
             .collect();
@@ -116,10 +138,17 @@ pub fn together(mut a: TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
     a
 }
 
+/// Every edge once in each direction, without mending anything.
+#[track_caller]
 pub fn closed(mesh: TriangleMesh) -> ClosedMesh {
     let (closed, warnings) = ClosedMesh::new(mesh).unwrap();
     assert_eq!(warnings, []);
     closed
+}
+
+/// Euler characteristic, components and genus.
+pub fn topology(mesh: &ClosedMesh) -> (i64, usize, i64) {
+    (mesh.euler_characteristic(), mesh.components(), mesh.genus())
 }
 
 /// Reproducible numbers in `[0, 1)` (Knuth's linear congruential generator).
@@ -137,5 +166,33 @@ impl Numbers {
     /// In a box.
     pub fn point(&mut self, min: [f64; 3], max: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| min[i] + (max[i] - min[i]) * self.next())
+    }
+}
+
+/// A random smooth function.
+pub fn waves(seed: u64) -> impl Fn(Vector) -> f64 + Sync {
+    let mut numbers = Numbers(seed);
+    let waves: Vec<(Vector, f64, f64)> = (0..6)
+        .map(|_| {
+            (
+                numbers.point([-9.0; 3], [9.0; 3]),
+                6.3 * numbers.next(),
+                numbers.next(),
+            )
+        })
+        .collect();
+    move |x| {
+        let wave =
+            |(k, phase, amplitude): &(Vector, f64, f64)| amplitude * (dot(*k, x) + phase).sin();
+        waves.iter().map(wave).sum()
+    }
+}
+
+/// Rounded to so many levels per unit; to none with 0.
+pub fn rounded(value: f64, levels: f64) -> f64 {
+    if levels > 0.0 {
+        (value * levels).round() / levels
+    } else {
+        value
     }
 }
