@@ -1,7 +1,7 @@
 //! Triangle meshes and volumes as initial data.
 
+use files::{Sha256, hexadecimal};
 use geometry::{PURE_BEYOND, npy};
-use runs::fingerprint;
 
 use crate::prelude::*;
 
@@ -171,7 +171,7 @@ fn about_file(path: &Path) -> Result<(String, Value)> {
     let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     let name = name.to_string_lossy().into_owned();
-    let about = json!({ "file": name, "sha256": fingerprint(bytes) });
+    let about = json!({ "file": name, "sha256": hexadecimal(Sha256::of(bytes)) });
     Ok((name, about))
 }
 

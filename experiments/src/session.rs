@@ -66,7 +66,7 @@ impl Session {
                 options.seed,
             )?,
             progress: Progress::new(options.quiet),
-            summary: Summary::new(),
+            summary: Summary::default(),
             report: Vec::new(),
             clock: Instant::now(),
             options: options.clone(),
@@ -118,9 +118,9 @@ impl Session {
     }
 
     /// Writes a figure; its title says so if this is a quick run.
-    pub fn figure(&self, figure: Figure, stem: &str) -> Result<()> {
-        let title = self.options.title(&figure.title);
-        Ok(Figure { title, ..figure }.write(&self.output, stem)?)
+    pub fn figure(&self, mut figure: Figure, stem: &str) -> Result<()> {
+        figure.title = self.options.title(&figure.title);
+        Ok(figure.write(&self.output, stem)?)
     }
 
     /// Writes a table, which is printed in the end, too, and adds its metrics.

@@ -5,7 +5,8 @@
 
 use engine::METRICS;
 use pages::{
-    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, Viewer, five_digits, thinned,
+    Facts, Image, Markup, Page, Section, Table, figure, five_digits, frames, markdown, thinned,
+    viewer,
 };
 use report::{Axis, LineChart, Marker, Series};
 
@@ -55,8 +56,8 @@ impl Files<'_> {
         if let Some(outcome) = &outcome {
             numbers.push(facts(outcome));
         }
-        let options = Details::new("Options").with(facts(&options));
-        let program = Details::new("Program, network and device").with(facts(about));
+        let options = Section::new("Options").with(facts(&options));
+        let program = Section::new("Program, network and device").with(facts(about));
         Ok(page.with(numbers.with(options).with(program)))
     }
 
@@ -70,24 +71,24 @@ impl Files<'_> {
 
     /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
     fn shape(&self) -> Result<Option<Section>> {
-        let section = Section::new("Shape");
-        let section = match engine::dimension(self.run)? {
-            2 => self.drawings()?.map(|frames| section.with(frames)),
-            _ => self.surfaces()?.map(|viewer| section.with(viewer)),
+        let shape = match engine::dimension(self.run)? {
+            2 => self.drawings()?,
+            _ => self.surfaces()?,
         };
-        let Some(mut section) = section else {
+        let Some(shape) = shape else {
             return Ok(None);
         };
+        let mut section = Section::new("Shape").with(shape);
         if let Some(bytes) = self.read(presentation::DISPLACEMENT)? {
             let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
             let caption =
                 "How far the surface has gone at its vertices, as colours and as a histogram.";
-            section.push(Figure::new(image, caption));
+            section.push(figure(&image, caption));
         }
         Ok(Some(section))
     }
 
-    fn drawings(&self) -> Result<Option<Frames>> {
+    fn drawings(&self) -> Result<Option<Markup>> {
         // Images are repaired in their own tones.
         let (before, format) = if self.has(plane::ORIGINAL) {
             (plane::ORIGINAL.trim_end_matches(".png"), "png")
@@ -101,10 +102,10 @@ impl Files<'_> {
                 drawings.push((label.clone(), Image::from_bytes(name, &bytes)?));
             }
         }
-        Ok((!drawings.is_empty()).then(|| Frames::new("The shape over the steps", drawings)))
+        Ok((!drawings.is_empty()).then(|| frames("The shape over the steps", &drawings)))
     }
 
-    fn surfaces(&self) -> Result<Option<Viewer>> {
+    fn surfaces(&self) -> Result<Option<Markup>> {
         let stages = self.stages(self.before(), &MESHES);
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
@@ -117,10 +118,15 @@ impl Files<'_> {
         let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
             .collect::<Result<_>>()?;
+<<<<<<< ours
         let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
         Ok(Some(Viewer::new(
+=======
+        let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
+        Ok(Some(viewer(
+>>>>>>> theirs
             "The surface over the steps",
-            Image::from_bytes(presentation::PICTURE, &poster)?,
+            &Image::from_bytes(presentation::PICTURE, &poster)?,
             view(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
@@ -170,17 +176,17 @@ impl Files<'_> {
         }
         // Mean curvature flow has no energy.
         curves.retain(|(_, points)| !points.is_empty());
-        let mut figure = report::Figure::new("", 3);
+        let mut plot = report::Figure::new("", 3);
         for (title, points) in curves {
             let mut series = Series::new("", points);
             if series.points.len() < FEW_STEPS {
                 series = series.with_marker(Marker::Circle);
             }
-            figure = figure.with_panel(
+            plot = plot.with_panel(
                 LineChart::new(title, Axis::linear("step"), Axis::linear("")).with_curves([series]),
             );
         }
-        let image = Image::from_bytes("the plot of the steps", figure.to_svg()?.as_bytes())?;
+        let image = Image::from_bytes("the plot of the steps", plot.to_svg()?.as_bytes())?;
         let table = Table::from_csv("Steps", &self.run.read_text(METRICS)?)?;
         let rows = || thinned(table.rows(), MOST_ROWS);
         let (shown, all) = (rows().count(), table.rows().len());
@@ -189,12 +195,13 @@ impl Files<'_> {
         );
         let head = table.head().iter().map(|key| in_words(&COLUMNS, key));
         let rows = rows().map(|row| row.iter().map(|cell| shortened(cell)));
-        let details = Details::new("Steps as a table")
-            .with(Text::markdown(&note))
+        let table = Section::new("Steps as a table")
+            .with(markdown(&note))
             .with(Table::new("Steps", head, rows)?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
-        let figure = Figure::new(image, caption);
-        Ok(Section::new("Steps").with(figure).with(details))
+        Ok(Section::new("Steps")
+            .with(figure(&image, caption))
+            .with(table))
     }
 
     /// The values at the beginning and over the steps.
@@ -235,7 +242,7 @@ fn shortened(cell: &str) -> String {
 /// The entries of a map.
 fn facts(values: &Value) -> Facts {
     let entries = values.as_object().into_iter().flatten();
-    entries.fold(Facts::new(), |facts, (key, value)| {
+    entries.fold(Facts::default(), |facts, (key, value)| {
         facts.with_value(&in_words(&KEYS, key), value)
     })
 }

@@ -1,9 +1,9 @@
 //! A flow and everything that its result depends on.
 
 use fem::FiniteElementStep;
+use files::{Sha256, hexadecimal};
 use geometry::{Grid, Stored};
 use operators::ComputeDevice;
-use runs::{fingerprint, fingerprint_of_parts};
 use serde_json::{Value, json};
 use solver::FlowParams;
 
@@ -119,19 +119,20 @@ impl<const D: usize> Case<D> {
     /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
-        let mut row = vec![0.0; grid.cells()];
-        let rows = (0..grid.len()).step_by(grid.cells()).map(|start| {
+        let (mut initial, mut row) = (Sha256::default(), vec![0.0; grid.cells()]);
+        for start in (0..grid.len()).step_by(grid.cells()) {
             self.initial.read(start, &mut row);
-            row.iter().flat_map(|value| value.to_le_bytes()).collect()
-        });
+            let bytes = row.iter().flat_map(|value| value.to_le_bytes());
+            initial.update(bytes.collect::<Vec<u8>>());
+        }
         let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
         let names: Vec<&str> = self.measures.iter().flat_map(Measure::names).collect();
         let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             "grid": { "dimension": D, "cells": grid.cells(), "side": grid.side(), "origin": grid.origin().to_vec() },
-            "initial": fingerprint_of_parts::<Vec<u8>>(rows),
-            "region": self.region.as_ref().map(marks).map(fingerprint),
+            "initial": hexadecimal(initial.finish()),
+            "region": self.region.as_ref().map(marks).map(|marks| hexadecimal(Sha256::of(marks))),
             "flow": self.flow,
             "operator": self.operator.identity(),
             "scales": self.scales,

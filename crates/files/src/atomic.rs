@@ -14,10 +14,7 @@ const BUFFER: usize = 1 << 16;
 /// Writes a file through a temporary one in the same folder.
 ///
 /// The temporary file is removed when something fails, also when `write` panics. The new file has
-/// the permissions of an ordinary new file.
-///
-/// # Errors
-/// [`Error`]; the action of an error of `write` is `write`.
+/// the permissions of an ordinary new file. The action of an error of `write` is `write`.
 pub fn write_atomically(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -26,9 +23,6 @@ pub fn write_atomically(
 }
 
 /// [`write_atomically`] on another storage than the disk itself.
-///
-/// # Errors
-/// As [`write_atomically`].
 pub fn write_atomically_on(
     storage: &dyn Storage,
     path: impl AsRef<Path>,
@@ -72,10 +66,7 @@ pub fn write_atomically_on(
     (storage.sync_folder(folder)).map_err(failed("flush the folder of"))
 }
 
-/// Makes a folder that lasts, and those that it is in, unless they are there.
-///
-/// # Errors
-/// [`Error`], also if there is something else of that name.
+/// Makes a folder that lasts, and those that it is in, unless they are there. Something else of that name is an error.
 pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<(), Error> {
     let path = path.as_ref();
     if path.as_os_str().is_empty() || path.is_dir() {
@@ -92,9 +83,6 @@ pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<
 }
 
 /// Proves that files can be made in a folder, by making one and removing it.
-///
-/// # Errors
-/// [`Error`] with the folder.
 pub fn probe(folder: impl AsRef<Path>) -> Result<(), Error> {
     let folder = folder.as_ref();
     let mut file = tempfile::Builder::new()

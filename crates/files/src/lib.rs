@@ -14,8 +14,10 @@
 //! - Temporary names begin with [`TEMPORARY_PREFIX`], and nothing else does. They are removed when
 //!   writing fails; only a process that is killed, or a power failure, leaves them behind.
 //! - Everything that changes the disk goes through [`Storage`], so that tests can let every single
-//!   operation fail.
+//!   operation fail. Its errors are those of the operating system, of which [`Error`] says where they came from.
 //! - [`Number`] reads the numbers of binary formats.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod atomic;
 mod checksum;

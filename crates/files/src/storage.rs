@@ -6,9 +6,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// The operations that change a disk, one method each. They do what they say by default, so that a
-/// test overrides those which it wants to fail, count or record. Their errors are what the operating
-/// system says.
-#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
+/// test overrides those which it wants to fail, count or record.
 pub trait Storage: fmt::Debug + Send + Sync {
     /// Makes a folder in an existing one; it is an error if there is something of that name.
     fn create_folder(&self, path: &Path) -> io::Result<()> {

@@ -210,14 +210,8 @@ impl<'a> Fuzz<'a> {
         let start = Instant::now();
         let attempt = catch_unwind(AssertUnwindSafe(|| {
             let (result, peak) = peak_of(|| read(bytes));
-            let refusal = match result {
-                Ok(value) => {
-                    accepted(bytes, value);
-                    None
-                }
-                Err(error) => Some(error.to_string()),
-            };
-            (refusal, peak)
+            let refusal = result.map(|value| accepted(bytes, value)).err();
+            (refusal.map(|error| error.to_string()), peak)
         }));
         let time = start.elapsed();
         let (refusal, peak) = attempt.map_err(|payload| panic_message(&*payload))?;

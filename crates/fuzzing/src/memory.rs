@@ -19,13 +19,7 @@ thread_local! {
     static COUNT: Cell<Option<Count>> = const { Cell::new(None) };
 }
 
-/// The system's allocator, counting for [`peak_of`]. To be declared by every test binary that
-/// measures:
-///
-/// ```
-/// #[global_allocator]
-/// static ALLOCATOR: fuzzing::CountingAllocator = fuzzing::CountingAllocator;
-/// ```
+/// The system's allocator, counting for [`peak_of`]. Every test binary that measures declares it as its `#[global_allocator]`.
 pub struct CountingAllocator;
 
 /// Counts bytes that are about to be taken; whether they may be.

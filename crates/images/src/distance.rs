@@ -1,11 +1,11 @@
-//! The exact signed distance to an outline.
+//! Signed distances to outlines and to interfaces of phase fields.
 
-use geometry::SignedDistance;
 use geometry::contour::Polyline;
+use geometry::{Field, SignedDistance, distances_from_phase_field};
 use rstar::primitives::Line;
 use rstar::{AABB, Envelope, RTree};
 
-use crate::Outline;
+use crate::{Error, Outline};
 
 /// Coordinates are below this, so that squares of distances are far from overflowing.
 const FAR: f64 = 1e100;
@@ -48,4 +48,24 @@ fn is_inside(segments: &RTree<Line<[f64; 2]>>, [x, y]: [f64; 2]) -> bool {
     };
     let crossed = segments.locate_in_envelope_intersecting(ray);
     crossed.filter(crosses).count() % 2 == 1
+}
+
+/// The distance `s = -(4 eps / 3) atanh u` to the interface of a phase field of width `eps`, interpolated by cubics.
+///
+/// The interpolant is [`geometry::Stored::spline`]. Near the interface of a phase field that keeps its profile it is the signed distance;
+/// elsewhere it has the right sign. In the box it is periodic; it ends at the faces, beyond which everything is outside.
+pub fn interface(u: &Field<2>, eps: f64) -> Result<impl SignedDistance<2> + use<>, Error> {
+    let distance = distances_from_phase_field(u, eps)?;
+    Ok(move |x: [f64; 2]| {
+        let (low, side) = (distance.grid().origin(), distance.grid().side());
+        let nearest = std::array::from_fn(|i| x[i].clamp(low[i], low[i] + side));
+        // The box is inside its faces.
+        let [a, b] = std::array::from_fn(|i| (low[i] - x[i]).max(x[i] - low[i] - side));
+        let outside = a.max(0.0).hypot(b.max(0.0));
+        let to_box = if a.max(b) > 0.0 { outside } else { a.max(b) };
+        if x.iter().any(|v| v.is_nan()) {
+            return f64::NAN;
+        }
+        distance.spline(nearest).0.max(to_box)
+    })
 }

@@ -14,12 +14,7 @@ const BAND: usize = 16;
 /// A shape in black, on paper of a colour or on nothing.
 ///
 /// The value of a pixel is the part of its area that the shape covers: near an edge the shape
-/// is taken for a half plane in each of 16 parts of the pixel. Colours are mixed in stored values,
-/// as drawing programs do, so that a pixel half covered by black on white has the value 0.5 and the
-/// outline is found again in the picture by a threshold of 0.5.
-///
-/// # Errors
-/// If the frame is too large, as one that was stored may be.
+/// is taken for a half plane in each of 16 parts of the pixel. The outline is found again in the picture by a threshold of 0.5.
 pub fn drawing(
     frame: &Frame,
     shape: &dyn SignedDistance<2>,
@@ -29,6 +24,7 @@ pub fn drawing(
     let paper = paper.map_or([0.0; 4], |Rgb(r, g, b)| {
         [r, g, b, 255].map(|v| f64::from(v) / 255.0)
     });
+    // A frame that was stored may have any size.
     let [width, height] = render::checked_size(frame.size())?.map(|side| side as usize);
     let mut pixels = vec![[0; 4]; width * height];
     let bands = pixels.par_chunks_mut(BAND * width).enumerate();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use crate::image::LARGEST_IMAGE;
 use crate::outline::LARGEST_OUTLINE;
-use crate::read::error::FormatError;
+use crate::read::LARGEST_FILE;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]
@@ -55,4 +55,36 @@ pub enum Error {
          not change sign"
     )]
     NoInterface { low: f64, high: f64 },
+}
+
+/// What is wrong with the contents of an image file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FormatError {
+    #[error("the file is empty")]
+    Empty,
+    #[error("it has more than {LARGEST_FILE} bytes; make the image smaller")]
+    TooLong,
+    #[error(
+        "it begins with the bytes {start:02x?}, which is none of PNG, JPEG, WebP, GIF, TIFF and \
+         BMP; save it as one of these"
+    )]
+    UnknownFormat { start: Vec<u8> },
+    #[error("it has {} x {} pixels, and may have 1 to {LARGEST_IMAGE}; make it smaller", _0[0], _0[1])]
+    Size([u32; 2]),
+    /// What the library of the format says.
+    #[error("damaged, truncated or unusual {format}: {message}; try saving it as PNG")]
+    Damaged {
+        format: &'static str,
+        message: String,
+    },
+}
+
+impl FormatError {
+    /// The message of a library.
+    pub(crate) fn damaged(format: &'static str, message: &str) -> Self {
+        // Some messages come in quotation marks.
+        let message = files::shortened(message, 160).trim_matches('"').to_owned();
+        Self::Damaged { format, message }
+    }
 }

@@ -15,9 +15,6 @@ pub struct Frame {
 
 impl Frame {
     /// A raster of so many columns and rows of pixels of side `pixel`, by its upper left corner.
-    ///
-    /// # Errors
-    /// As [`render::checked_size`]; the numbers must be finite, the pixels of positive side.
     pub fn new(size: [u32; 2], upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
         for x in upper_left {
             require("coordinate of the corner", x, "finite", |_| true)?;
@@ -30,9 +27,6 @@ impl Frame {
     }
 
     /// The box of a grid, with that many pixels a side.
-    ///
-    /// # Errors
-    /// As [`Frame::new`].
     pub fn of_box(grid: &Grid<2>, pixels: u32) -> Result<Self, Error> {
         let [x, y] = grid.origin();
         let pixel = grid.side() / f64::from(pixels.max(1));

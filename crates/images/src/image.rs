@@ -10,10 +10,7 @@ pub const LARGEST_IMAGE: usize = 1 << 26;
 /// Largest value of a pixel.
 const WHITE: f64 = 65535.0;
 
-/// An image: a grey value and an opacity at every pixel, 16 bits each, row by row from the top.
-///
-/// Grey values are those stored in files, from black (0) to white (65535), evenly spaced for the
-/// eye and not in light.
+/// An image: a grey value, from black (0) to white (65535) as files store it, and an opacity at every pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     size: [u32; 2],
@@ -23,11 +20,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Takes over pixels; without opacities, all are opaque.
-    ///
-    /// # Errors
-    /// [`Error::ImageSize`] unless there are from one to [`LARGEST_IMAGE`] pixels,
-    /// [`Error::PixelCount`] unless that many values are given.
+    /// Takes over pixels, from one to [`LARGEST_IMAGE`]; without opacities, all are opaque.
     pub fn new(size: [u32; 2], grey: Vec<u16>, opacity: Option<Vec<u16>>) -> Result<Self, Error> {
         let pixels = pixels(size).ok_or(Error::ImageSize(size))?;
         let opacities = opacity.as_ref().map_or(pixels, Vec::len);

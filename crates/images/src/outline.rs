@@ -21,19 +21,13 @@ impl Outline {
     /// The outline of the pixels of an image that are on the given side, resolved below the size
     /// of a pixel.
     ///
-    /// The plane has its origin at the lower left corner of the image, the first axis to the right,
-    /// the second upwards, and the side of a pixel as unit: the image fills `[0, width] x
-    /// [0, height]` and its values belong to the centres of the pixels. Between them
+    /// Values belong to the centres of the pixels. Between them
     /// marching squares interpolate linearly; where two opposite corners of a cell are inside, the
     /// mean of all four decides whether they are joined. Up to the edge of the image, half a pixel
-    /// further, values stay as they are; beyond everything is outside.
+    /// further, values stay as they are.
     ///
     /// At smooth edges the outline is right to a tenth of a pixel if they are blended, and to half a
     /// pixel if they are hard. Corners are cut off by half a pixel.
-    ///
-    /// # Errors
-    /// [`Error::OneSided`], or [`Error::Noise`] for more than
-    /// [`LARGEST_OUTLINE`] segments.
     pub fn of_image(image: &Image, side: Side) -> Result<Self, Error> {
         let [width, height] = image.size().map(|n| n as usize);
         let depth = |pixel: usize| side.depth(image.pixel(pixel));
@@ -90,9 +84,6 @@ impl Outline {
     ///
     /// Points every half unit move towards the middle of their neighbours again and again, but none goes further than `tolerance` from
     /// where it was; then each curve gets back the area that it has lost by this. Of an image, [`Tones::raster`](crate::Tones::raster) says how far the points of its outline may be off.
-    ///
-    /// # Errors
-    /// The tolerance must be finite and positive.
     pub fn smoothed(&self, tolerance: f64) -> Result<Self, Error> {
         positive("tolerance", tolerance)?;
         let curves = self.curves.par_iter();
@@ -105,9 +96,6 @@ impl Outline {
     /// [`contour::zero_level`](geometry::contour::zero_level), in the whole box of the grid with
     /// its repeated last layer. Where `u > 0` at a face of the box the curve runs along
     /// that face, so that all curves are closed.
-    ///
-    /// # Errors
-    /// [`Error::NoInterface`] if `u` does not change sign, values that are not finite.
     pub fn of_phase_field(u: &Field<2>) -> Result<Self, Error> {
         u.check_finite()?;
         let (low, high) = range(u.values().iter().copied());
@@ -181,21 +169,15 @@ impl Outline {
 fn every_half_unit(curve: &Polyline) -> Vec<[f64; 2]> {
     let length = curve.length();
     let count = ((2.0 * length).ceil() as usize).max(8);
-    let mut segments = curve.segments();
+    let at = |k: usize| length * k as f64 / count as f64;
     let (mut points, mut passed) = (Vec::with_capacity(count), 0.0);
-    let mut segment = segments.next();
-    for k in 0..count {
-        let at = length * k as f64 / count as f64;
-        while let Some((a, b)) = segment {
-            let part = (b[0] - a[0]).hypot(b[1] - a[1]);
-            if at <= passed + part {
-                let t = (at - passed) / part.max(f64::MIN_POSITIVE);
-                points.push([0, 1].map(|i| a[i] + t * (b[i] - a[i])));
-                break;
-            }
-            passed += part;
-            segment = segments.next();
+    for (a, b) in curve.segments() {
+        let part = (b[0] - a[0]).hypot(b[1] - a[1]);
+        while points.len() < count && at(points.len()) <= passed + part {
+            let t = (at(points.len()) - passed) / part.max(f64::MIN_POSITIVE);
+            points.push([0, 1].map(|i| a[i] + t * (b[i] - a[i])));
         }
+        passed += part;
     }
     points
 }

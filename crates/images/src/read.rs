@@ -1,6 +1,5 @@
 //! Image files in.
 
-pub(crate) mod error;
 mod jpeg;
 
 use std::fs::File;
@@ -12,8 +11,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use render::Picture;
 
 use crate::image::{LARGEST_IMAGE, pixels};
-use crate::{Error, Image};
-use error::FormatError;
+use crate::{Error, FormatError, Image};
 
 /// Largest image file, in bytes: eight bytes a pixel, as many as the largest image has at 16 bits
 /// without compression.
@@ -35,10 +33,6 @@ const DEEPEST: u64 = 16;
 /// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 24 bytes each while decoding; beside
 /// them four times the size of the file, which is at most eight bytes for each of these pixels, and
 /// 32 MiB. The size is checked before anything is decoded.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Format`] for everything that is wrong
-/// with its contents.
 pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
     let path = path.as_ref();
     let io = |source| files::Error::of("read", path)(source);
@@ -61,17 +55,11 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
 }
 
 /// The image in the bytes of a file; see [`read`].
-///
-/// # Errors
-/// Whatever is wrong with them, in one line.
 pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
     upright(bytes, Tones::Grey).map(converted)
 }
 
 /// The image in the bytes of a file with its colours and opacities, 8 bits each; `path` is for messages.
-///
-/// # Errors
-/// [`Error::Format`].
 pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
     let format = |problem| Error::Format {
         path: path.as_ref().into(),
@@ -99,18 +87,14 @@ fn upright(bytes: &[u8], tones: Tones) -> Result<DynamicImage, FormatError> {
     let unknown = || FormatError::UnknownFormat {
         start: bytes.iter().take(8).copied().collect(),
     };
-    let name = match image::guess_format(bytes).map_err(|_| unknown())? {
-        ImageFormat::Png => "PNG",
-        ImageFormat::Jpeg => "JPEG",
-        ImageFormat::WebP => "WebP",
-        ImageFormat::Gif => "GIF",
-        ImageFormat::Tiff => "TIFF",
-        ImageFormat::Bmp => "BMP",
+    let (mut image, orientation) = match image::guess_format(bytes).map_err(|_| unknown())? {
+        ImageFormat::Jpeg => jpeg::decode(bytes, tones)?,
+        ImageFormat::Png => other("PNG", bytes)?,
+        ImageFormat::WebP => other("WebP", bytes)?,
+        ImageFormat::Gif => other("GIF", bytes)?,
+        ImageFormat::Tiff => other("TIFF", bytes)?,
+        ImageFormat::Bmp => other("BMP", bytes)?,
         _ => return Err(unknown()),
-    };
-    let (mut image, orientation) = match name {
-        "JPEG" => jpeg::decode(bytes, tones)?,
-        _ => other(name, bytes)?,
     };
     image.apply_orientation(orientation.unwrap_or(Orientation::NoTransforms));
     Ok(image)

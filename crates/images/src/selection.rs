@@ -5,11 +5,7 @@ use geometry::require;
 
 use crate::{Error, Image};
 
-/// Which pixels of an image are inside: those on a side of a threshold.
-///
-/// Grey values are compared as they are stored, which is evenly spaced for the eye, and not in
-/// light: drawing programs blend edges in stored values, so that a pixel half covered by black on
-/// white has the value 0.5. Values equal to the threshold are outside.
+/// Which pixels of an image are inside: those on a side of a threshold. Values equal to it are outside.
 #[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Side {
     /// `1 - opacity (1 - grey)`, the grey value on white, is below the threshold.
@@ -25,10 +21,7 @@ pub enum Side {
 
 impl Side {
     /// Decides for an image: inside are the opaque pixels if one is less than half opaque; else the dark ones, unless more than
-    /// half of the pixels at the border are dark, and then the light ones.
-    ///
-    /// # Errors
-    /// [`geometry::Error::InvalidParameter`] unless the threshold is from 0 (black, transparent) to 1.
+    /// half of the pixels at the border are dark, and then the light ones. The threshold is from 0 (black, transparent) to 1.
     pub fn of(image: &Image, threshold: f64) -> Result<Self, Error> {
         let is_fraction = |v: f64| (0.0..=1.0).contains(&v);
         let threshold = require("threshold", threshold, "from 0 to 1", is_fraction)?;

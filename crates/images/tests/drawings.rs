@@ -4,16 +4,11 @@
 
 use std::f64::consts::PI;
 
-use crate::common::{Raster, disc, near, square};
+use crate::common::{Raster, disc, near, outline, square};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, SignedDistance, phase_field};
-use images::{Frame, Image, Outline, Side, decode, drawing, interface, svg};
+use images::{Frame, decode, drawing, interface, svg};
 use render::{Picture, Rgb};
-
-fn outline(image: &Image) -> Outline {
-    let side = Side::of(image, 0.5).unwrap();
-    Outline::of_image(image, side).unwrap()
-}
 
 fn on_white(frame: &Frame, shape: &dyn SignedDistance<2>) -> Picture {
     drawing(frame, shape, Some(Rgb::WHITE)).unwrap()

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::files::{SIZE, chunk, exif, other_files, png_files, raster, widened, zlib};
+use crate::common::files::{SIZE, exif, other_files, png_files, png_of_chunks, raster, widened};
 use crate::common::{Raster, disc, jpeg, png};
 use images::{Error, FormatError, decode, read};
 use jpeg_encoder::ColorType as Jpeg;
@@ -67,16 +67,7 @@ fn interlaced_png_is_read() {
             }
         }
     }
-    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
-    let header = [
-        &5_u32.to_be_bytes()[..],
-        &5_u32.to_be_bytes(),
-        &[8, 0, 0, 0, 1],
-    ]
-    .concat();
-    chunk(&mut bytes, *b"IHDR", &header);
-    chunk(&mut bytes, *b"IDAT", &zlib(&data));
-    chunk(&mut bytes, *b"IEND", &[]);
+    let bytes = png_of_chunks([5; 2], 1, &[], &data);
     let expected = (0..5).flat_map(|y| (0..5).map(move |x| 10 * y + x));
     assert_eq!(decode(&bytes).unwrap().grey(), widened(expected));
 }
@@ -157,20 +148,12 @@ fn photographs_are_set_upright() {
             })
             .collect();
         for little in [false, true] {
-            let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
-            let size = [width as u32, height as u32].map(u32::to_be_bytes).concat();
-            chunk(
-                &mut bytes,
-                *b"IHDR",
-                &[&size[..], &[8, 0, 0, 0, 0]].concat(),
-            );
-            chunk(&mut bytes, *b"eXIf", &exif(value, little));
+            let (size, exif) = ([width as u32, height as u32], exif(value, little));
             let rows: Vec<u8> = stored
                 .chunks(width)
                 .flat_map(|row| [&[0], row].concat())
                 .collect();
-            chunk(&mut bytes, *b"IDAT", &zlib(&rows));
-            chunk(&mut bytes, *b"IEND", &[]);
+            let bytes = png_of_chunks(size, 0, &[(*b"eXIf", &exif[..])], &rows);
             let image = decode(&bytes).unwrap();
             assert_eq!(image.size(), [3, 2], "{value}");
             assert_eq!(image.grey(), widened(upright.concat()), "{value}");
@@ -222,17 +205,8 @@ fn files_that_are_no_images_are_explained() {
         );
         assert!(!text.contains('\n') && text.len() < 200, "{text}");
     }
-    let mut huge = b"\x89PNG\r\n\x1a\n".to_vec();
-    let header = [
-        &8193_u32.to_be_bytes()[..],
-        &8192_u32.to_be_bytes(),
-        &[8, 0, 0, 0, 0],
-    ]
-    .concat();
-    chunk(&mut huge, *b"IHDR", &header);
-    chunk(&mut huge, *b"IDAT", &[]);
     assert_eq!(
-        message(&huge),
+        message(&png_of_chunks([8193, 8192], 0, &[], &[])),
         "it has 8193 x 8192 pixels, and may have 1 to 67108864; make it smaller"
     );
 

@@ -4,17 +4,12 @@
 
 use std::f64::consts::PI;
 
-use crate::common::{Raster, disc, jpeg, near, square};
+use crate::common::{Raster, disc, jpeg, near, outline, square};
 use geometry::contour::Polyline;
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, Placement, SignedDistance, SignedDistanceExt, optimal_profile};
 use images::{Error, Image, Outline, Side, Tones, decode, interface};
 use proptest::prelude::*;
-
-fn outline(image: &Image) -> Outline {
-    let side = Side::of(image, 0.5).unwrap();
-    Outline::of_image(image, side).unwrap()
-}
 
 /// The largest deviation of the distance from the exact one, over the image and around it.
 fn deviation(outline: &Outline, exact: &impl SignedDistance<2>, size: f64) -> f64 {

@@ -19,11 +19,6 @@ pub struct Facts {
 const LONGEST_SERIES: usize = 6;
 
 impl Facts {
-    /// An empty list.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds an entry at the end.
     pub fn with(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
         self.entries.push((name.into(), value.into()));
@@ -32,20 +27,16 @@ impl Facts {
 
     /// Adds a value at the end: entries of maps are named `name: key of the entry`, lists of plain values are one line,
     /// numbers have five digits unless they are whole, and null is left out.
-    pub fn with_value(mut self, name: &str, value: &Value) -> Self {
+    pub fn with_value(self, name: &str, value: &Value) -> Self {
         match value {
-            Value::Object(map) => {
-                for (key, value) in map {
-                    let name = format!("{name}: {}", key.replace('_', " "));
-                    self = self.with_value(&name, value);
-                }
-                self
-            }
+            Value::Object(map) => map.iter().fold(self, |facts, (key, value)| {
+                facts.with_value(&format!("{name}: {}", key.replace('_', " ")), value)
+            }),
             Value::Array(values) if values.iter().any(|v| v.is_object() || v.is_array()) => {
-                for (k, value) in values.iter().enumerate() {
-                    self = self.with_value(&format!("{name}[{k}]"), value);
-                }
-                self
+                let values = values.iter().enumerate();
+                values.fold(self, |facts, (k, value)| {
+                    facts.with_value(&format!("{name}[{k}]"), value)
+                })
             }
             Value::Array(values) => {
                 let values: Vec<String> = values.iter().map(plain).collect();
@@ -58,9 +49,6 @@ impl Facts {
 
     /// The metrics in the text of a `summary.json`, a flat map from names to numbers; `name` is for
     /// messages. Numbers have five digits, and a long series `x.step0`, `x.step1`, ... one line.
-    ///
-    /// # Errors
-    /// [`Error::Json`] if it is something else.
     pub fn from_summary(name: &str, json: &str) -> Result<Self> {
         let failed = |problem: String| Error::Json {
             name: name.to_owned(),
@@ -77,17 +65,15 @@ impl Facts {
             metrics.push((metric, number));
         }
         metrics.sort_by(|(a, _), (b, _)| natural(a, b));
-        let mut facts = Self::new();
+        let mut facts = Self::default();
         for group in
             metrics.chunk_by(|(a, _), (b, _)| series(a).is_some() && series(a) == series(b))
         {
             let ((first, from), (last, to)) = (group[0], group[group.len() - 1]);
             if group.len() > LONGEST_SERIES {
                 let step = last.rsplit('.').next().unwrap_or_default();
-                facts = facts.with(
-                    format!("{first} … {step}"),
-                    format!("{} … {}", five_digits(from), five_digits(to)),
-                );
+                let [from, to] = [from, to].map(five_digits);
+                facts = facts.with(format!("{first} … {step}"), format!("{from} … {to}"));
             } else {
                 for &(metric, value) in group {
                     facts = facts.with(metric, five_digits(value));
@@ -183,23 +169,17 @@ mod tests {
             );
         }
         json.push_str(",\"a.n128\":2e-7,\"a.n64\":3,\"b.step0\":1,\"b.step1\":2}");
+        let expected = [
+            ("a.n64", "3"),
+            ("a.n128", "2.0000e\u{2212}7"),
+            ("a.tip.step0 … step11", "0.50000 … 1.8750"),
+            ("a.w", "1.5000"),
+            ("b.step0", "1"),
+            ("b.step1", "2"),
+        ];
+        let expected = expected.map(|(name, value)| (name.to_owned(), value.to_owned()));
         let facts = Facts::from_summary("summary.json", &json).unwrap();
-        let entries: Vec<(&str, &str)> = facts
-            .entries
-            .iter()
-            .map(|(name, value)| (name.as_str(), value.as_str()))
-            .collect();
-        assert_eq!(
-            entries,
-            [
-                ("a.n64", "3"),
-                ("a.n128", "2.0000e\u{2212}7"),
-                ("a.tip.step0 … step11", "0.50000 … 1.8750"),
-                ("a.w", "1.5000"),
-                ("b.step0", "1"),
-                ("b.step1", "2"),
-            ]
-        );
+        assert_eq!(facts.entries, expected);
     }
 
     #[test]

@@ -6,8 +6,7 @@ use maud::{Markup, html};
 
 use crate::error::{Error, Result};
 
-/// An intact PNG or SVG picture, which becomes a part of the page: one file that can
-/// be moved and mailed.
+/// An intact PNG or SVG picture, which becomes a part of the page.
 #[derive(Clone, Debug)]
 pub struct Image {
     mime: &'static str,
@@ -17,19 +16,18 @@ pub struct Image {
 
 impl Image {
     /// A picture from the bytes of a PNG or SVG file; `name` is for messages.
-    ///
-    /// # Errors
-    /// [`Error::Picture`] if it is damaged or something else.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
-        let image = if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-            png(bytes)
+        let (mime, size) = if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+            ("image/png", png(bytes).map(Some))
         } else {
-            svg(bytes)
+            ("image/svg+xml", svg(bytes))
         };
-        image.map_err(|problem| Error::Picture {
+        let size = size.map_err(|problem| Error::Picture {
             name: name.to_owned(),
             problem,
-        })
+        })?;
+        let data = STANDARD.encode(bytes);
+        Ok(Self { mime, data, size })
     }
 
     /// The element; `alternative` is for readers who cannot see the picture.
@@ -42,8 +40,8 @@ impl Image {
     }
 }
 
-/// Reads the whole picture, so that damage is found here and not by those who look at the page.
-fn png(bytes: &[u8]) -> Result<Image, String> {
+/// The size of a PNG picture. All of it is read, so that damage is found here and not by those who look at the page.
+fn png(bytes: &[u8]) -> Result<[u32; 2], String> {
     let line = |error: png::DecodingError| error.to_string();
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))
         .read_info()
@@ -56,14 +54,11 @@ fn png(bytes: &[u8]) -> Result<Image, String> {
     let mut pixels = vec![0; length];
     reader.next_frame(&mut pixels).map_err(line)?;
     reader.finish().map_err(line)?;
-    Ok(Image {
-        mime: "image/png",
-        data: STANDARD.encode(bytes),
-        size: Some(size),
-    })
+    Ok(size)
 }
 
-fn svg(bytes: &[u8]) -> Result<Image, String> {
+/// The size of an SVG picture, if it has one.
+fn svg(bytes: &[u8]) -> Result<Option<[u32; 2]>, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is neither PNG nor text".to_owned())?;
     let document = roxmltree::Document::parse(text).map_err(|error| error.to_string())?;
     let root = document.root_element();
@@ -75,11 +70,7 @@ fn svg(bytes: &[u8]) -> Result<Image, String> {
         let value: f64 = root.attribute(attribute)?.parse().ok()?;
         (value >= 1.0 && value <= f64::from(u32::MAX)).then_some(value.round() as u32)
     };
-    Ok(Image {
-        mime: "image/svg+xml",
-        data: STANDARD.encode(bytes),
-        size: side("width").zip(side("height")).map(|(w, h)| [w, h]),
-    })
+    Ok(side("width").zip(side("height")).map(|(w, h)| [w, h]))
 }
 
 #[cfg(test)]

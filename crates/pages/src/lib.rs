@@ -1,7 +1,7 @@
 //! Pages to look at: figures, tables, picture sequences and surfaces to turn in one HTML file.
 //!
 //! ```
-//! use pages::{Details, Facts, Image, Page, Section, Table, View, Viewer};
+//! use pages::{Facts, Image, Page, Section, Table, View, viewer};
 //! use geometry::{Grid, phase_field, shapes::Ball};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,13 +14,13 @@
 //!         .render([160, 120])?;
 //!
 //!     let poster = Image::from_bytes("ball", &picture.to_png()?)?;
-//!     let ball = Viewer::new("A ball", poster, View::default(), [("step 0", &mesh)])?;
+//!     let ball = viewer("A ball", &poster, View::default(), [("step 0", &mesh)])?;
 //!     let table = Table::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
-//!     let details = Details::new("Parameters").with(Facts::new().with("eps", "2 h"));
+//!     let parameters = Section::new("Parameters").with(Facts::default().with("eps", "2 h"));
 //!     let page = Page::new("Balls & spheres")
 //!         .with_lead("What a ball looks like.")
 //!         .with(Section::new("Surface").with(ball))
-//!         .with(Section::new("Numbers").with(table).with(details));
+//!         .with(Section::new("Numbers").with(table).with(parameters));
 //!     let html = page.to_html();
 //!     assert!(html.contains("<h1>Balls &amp; spheres</h1>"));
 //! #   let folder = tempfile::tempdir()?;
@@ -33,7 +33,7 @@
 //! # Conventions
 //!
 //! - A page works from a disk, from a server and from a mail; it asks the network for nothing.
-//! - Whatever text comes in is text, never markup, but for [`Text::markdown`] and the cells of tables
+//! - Whatever text comes in is text, never markup, but for [`markdown`] and the cells of tables
 //!   in Markdown, which cannot bring in scripts or pictures.
 //! - Without JavaScript everything but turning and playing is there: sequences are strips, surfaces
 //!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see
@@ -42,6 +42,9 @@
 //! - The same input gives the same bytes.
 //! - A page opened as `page.html#check` starts everything on it and says in the attribute
 //!   `data-check` of its root what did not work; `scripts/check_pages` reads that.
+//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 pub mod results;
 
@@ -57,8 +60,9 @@ mod viewer;
 pub use error::{Error, Result};
 pub use facts::{Facts, five_digits};
 pub use image::Image;
-pub use page::{Details, Figure, Frames, Page, Section, thinned};
+pub use maud::Markup;
+pub use page::{Page, Section, figure, frames, thinned};
 pub use render::View;
 pub use table::Table;
-pub use text::Text;
-pub use viewer::Viewer;
+pub use text::{markdown, paragraph};
+pub use viewer::viewer;

@@ -10,7 +10,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use crate::error::Result;
 use crate::image::Image;
-use crate::text::Text;
 
 const STYLE: &str = include_str!("../assets/page.css");
 const CONTROLS: &str = include_str!("../assets/controls.js");
@@ -24,13 +23,12 @@ const CONTENTS_FROM: usize = 3;
 /// A page with a title and sections.
 ///
 /// Its HTML needs nothing else: style, scripts and pictures are inside, and a content security policy
-/// forbids the browser to load anything from anywhere, or to run any other script. The same page
-/// gives the same bytes.
+/// forbids the browser to load anything from anywhere, or to run any other script.
 #[must_use]
 #[derive(Clone, Debug)]
 pub struct Page {
     title: String,
-    lead: Vec<Text>,
+    lead: Vec<String>,
     sections: Vec<Section>,
 }
 
@@ -45,7 +43,7 @@ impl Page {
     }
 
     /// Adds a paragraph between the title and the first section.
-    pub fn with_lead(mut self, text: impl Into<Text>) -> Self {
+    pub fn with_lead(mut self, text: impl Into<String>) -> Self {
         self.lead.push(text.into());
         self
     }
@@ -87,7 +85,7 @@ impl Page {
                 body {
                     header {
                         h1 { (self.title) }
-                        @for text in &self.lead { (text) }
+                        @for text in &self.lead { p { (text) } }
                     }
                     @if ids.len() >= CONTENTS_FROM {
                         nav aria-label="Contents" {
@@ -107,9 +105,6 @@ impl Page {
     }
 
     /// Writes the page, atomically.
-    ///
-    /// # Errors
-    /// [`Error::Write`](crate::Error::Write).
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let html = self.to_html();
         Ok(write_atomically(path, |out| {
@@ -170,7 +165,7 @@ fn policy(script: &str) -> String {
     )
 }
 
-/// A part of a page under a heading of its own.
+/// A part of a page under a heading of its own. Within another section it is a block behind a line that opens it.
 #[must_use]
 #[derive(Clone, Debug)]
 pub struct Section {
@@ -197,8 +192,8 @@ impl Section {
         self
     }
 
-    /// Adds a [`Text`], [`Figure`], [`Table`](crate::Table), [`Facts`](crate::Facts), [`Frames`],
-    /// [`Viewer`](crate::Viewer) or [`Details`].
+    /// Adds a block: a [paragraph](crate::paragraph), text in [Markdown](crate::markdown), a [`figure`], a [`Table`](crate::Table),
+    /// [`Facts`](crate::Facts), [`frames`], a [viewer](crate::viewer()) or another section.
     pub fn with(mut self, block: impl Render) -> Self {
         self.push(block);
         self
@@ -210,93 +205,32 @@ impl Section {
     }
 }
 
-/// Blocks behind a line that opens them.
-#[must_use]
-#[derive(Clone, Debug)]
-pub struct Details {
-    summary: String,
-    body: String,
-}
-
-impl Details {
-    /// Nothing yet behind the given line.
-    pub fn new(summary: impl Into<String>) -> Self {
-        Self {
-            summary: summary.into(),
-            body: String::new(),
-        }
-    }
-
-    /// Adds a block as [`Section::with`] does.
-    pub fn with(mut self, block: impl Render) -> Self {
-        block.render_to(&mut self.body);
-        self
-    }
-}
-
-impl Render for Details {
+impl Render for Section {
     fn render(&self) -> Markup {
-        html! { details { summary { (self.summary) } (PreEscaped(&self.body)) } }
+        html! { details { summary { (self.title) } (PreEscaped(&self.body)) } }
     }
 }
 
 /// A picture with a caption, which also is what readers are told who cannot see the picture.
-#[derive(Clone, Debug)]
-pub struct Figure {
-    image: Image,
-    caption: String,
-}
-
-impl Figure {
-    /// Puts a caption below a picture.
-    pub fn new(image: Image, caption: impl Into<String>) -> Self {
-        Self {
-            image,
-            caption: caption.into(),
-        }
+pub fn figure(image: &Image, caption: &str) -> Markup {
+    html! {
+        figure { (image.html(caption)) figcaption { (caption) } }
     }
 }
 
-impl Render for Figure {
-    fn render(&self) -> Markup {
-        html! {
-            figure { (self.image.html(&self.caption)) figcaption { (self.caption) } }
-        }
-    }
-}
-
-/// Pictures of which one is shown at a time, chosen by a slider or played. Without JavaScript they
-/// are a strip that scrolls.
-#[derive(Clone, Debug)]
-pub struct Frames {
-    caption: String,
-    frames: Vec<(String, Image)>,
-}
-
-impl Frames {
-    /// One picture or more with a label each, such as the step of a flow.
-    pub fn new(caption: impl Into<String>, frames: Vec<(String, Image)>) -> Self {
-        Self {
-            caption: caption.into(),
-            frames,
-        }
-    }
-}
-
-impl Render for Frames {
-    fn render(&self) -> Markup {
-        html! {
-            figure.frames {
-                div.strip tabindex="0" role="region" aria-label=(self.caption) {
-                    @for (label, image) in &self.frames {
-                        div.frame data-label=(label) {
-                            (image.html(&format!("{}, {label}", self.caption)))
-                            span { (label) }
-                        }
+/// Pictures of which one is shown at a time, chosen by a slider or played: one or more with a label each, such as the step of a flow.
+pub fn frames(caption: &str, frames: &[(String, Image)]) -> Markup {
+    html! {
+        figure.frames {
+            div.strip tabindex="0" role="region" aria-label=(caption) {
+                @for (label, image) in frames {
+                    div.frame data-label=(label) {
+                        (image.html(&format!("{caption}, {label}")))
+                        span { (label) }
                     }
                 }
-                figcaption { (self.caption) }
             }
+            figcaption { (caption) }
         }
     }
 }

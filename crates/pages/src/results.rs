@@ -15,9 +15,9 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::facts::{Facts, five_digits, natural};
 use crate::image::Image;
-use crate::page::{Details, Figure, Page, Section};
+use crate::page::{Page, Section, figure};
 use crate::table::Table;
-use crate::text::Text;
+use crate::text::{linked, markdown, paragraph};
 
 /// Longer tables are folded away.
 const LONGEST_OPEN_TABLE: usize = 24;
@@ -46,10 +46,7 @@ static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
 });
 
 /// The page of all experiments in a folder, in the paper's order after its `README.md`, and what is
-/// missing or broken.
-///
-/// # Errors
-/// [`Error::Read`] if the folder cannot be read. Files are none.
+/// missing or broken. Only a folder that cannot be read is an error.
 pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     let mut problems = Vec::new();
     let mut found: BTreeSet<String> = entries(folder, true)?.into_iter().collect();
@@ -68,7 +65,7 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
             let name = target.split('/').next()?;
             names.iter().find(|other| *other == name).cloned()
         };
-        let text = Text::linked(without_title(&text), section);
+        let text = linked(without_title(&text), section);
         sections.push(Section::new("Beside the paper").with(text));
     }
     for name in &names {
@@ -76,7 +73,7 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     }
     let mut first = Section::new("Missing or broken files").named("problems");
     for problem in &problems {
-        first.push(Text::from(problem.to_string()));
+        first.push(paragraph(&problem.to_string()));
     }
     let first = (!problems.is_empty()).then_some(first);
     let page = first.into_iter().chain(sections).fold(page, Page::with);
@@ -92,17 +89,21 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
     let title = entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone());
     let mut section = Section::new(title).named(name);
     if let Some(entry) = entry {
-        section.push(Text::markdown(&entry.description));
+        section.push(markdown(&entry.description));
     }
-    let captions = entry.map_or(&[][..], |entry| &entry.figures);
-    let pictures = files.iter().filter(|file| extension_of(file) == "png");
-    for (file, caption) in ordered(pictures.cloned().collect(), captions) {
-        let Some(file) = file else {
-            problems.push(Error::Missing(path(&caption)));
-            continue;
-        };
-        if let Some(image) = kept(image(root, &path(&file)), problems) {
-            section.push(Figure::new(image, caption));
+    let known = entry.map_or(&[][..], |entry| &entry.figures).iter();
+    let known = known.map(|(stem, caption)| (format!("{stem}.png"), caption.clone()));
+    let mut pictures: Vec<(String, String)> = known.collect();
+    for file in files.iter().filter(|file| extension_of(file) == "png") {
+        if pictures.iter().all(|(other, _)| other != file) {
+            pictures.push((file.clone(), format!("{}.", spelled_out(stem_of(file)))));
+        }
+    }
+    for (file, caption) in pictures {
+        if !files.contains(&file) {
+            problems.push(Error::Missing(path(&file)));
+        } else if let Some(image) = kept(image(root, &path(&file)), problems) {
+            section.push(figure(&image, &caption));
         }
     }
     let mut folded = Vec::new();
@@ -115,23 +116,24 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
                 Table::from_csv(path(file), &text)
             }
         });
-        let Some(table) = kept(table, problems) else {
+        let Some(mut table) = kept(table, problems) else {
             continue;
         };
-        let (rows, table) = (table.rows().len(), table.with_caption(&caption));
+        table.caption.clone_from(&caption);
+        let rows = table.rows().len();
         if marked && rows <= LONGEST_OPEN_TABLE {
             section.push(table);
         } else if marked || rows <= LONGEST_CSV {
-            folded.push(Details::new(format!("{caption} ({rows} rows)")).with(table));
+            folded.push(Section::new(format!("{caption} ({rows} rows)")).with(table));
         }
     }
     let summary = path("summary.json");
     let summary = read(root, &summary).and_then(|json| Facts::from_summary(&summary, &json));
     if let Some(summary) = kept(summary, problems) {
-        folded.push(Details::new("Metrics").with(summary));
+        folded.push(Section::new("Metrics").with(summary));
     }
     if let Some(facts) = facts {
-        folded.push(Details::new("How it was computed").with(facts));
+        folded.push(Section::new("How it was computed").with(facts));
     }
     folded.into_iter().fold(section, Section::with)
 }
@@ -210,7 +212,7 @@ fn manifest(root: &Path, file: &str) -> Result<Facts> {
     let parameters = parameters.iter().map(|(key, value)| (key.as_str(), value));
     let facts = named
         .chain(parameters)
-        .fold(Facts::new(), |facts, (key, value)| {
+        .fold(Facts::default(), |facts, (key, value)| {
             facts.with_value(key, value)
         });
     let phases = manifest["phases"].as_array().map_or(&[][..], Vec::as_slice);
@@ -229,26 +231,6 @@ fn without_title(text: &str) -> &str {
         Some((first, rest)) if first.starts_with("# ") => rest,
         _ => text,
     }
-}
-
-/// Files of the captions, or, where there is none, its name; then other files with their names.
-fn ordered(
-    mut single: Vec<String>,
-    captions: &[(String, String)],
-) -> Vec<(Option<String>, String)> {
-    let mut figures = Vec::new();
-    for (stem, caption) in captions {
-        let place = single.iter().position(|file| stem_of(file) == *stem);
-        figures.push(match place {
-            Some(place) => (Some(single.remove(place)), caption.clone()),
-            None => (None, format!("{stem}.png")),
-        });
-    }
-    figures.extend(single.into_iter().map(|file| {
-        let caption = format!("{}.", spelled_out(stem_of(&file)));
-        (Some(file), caption)
-    }));
-    figures
 }
 
 /// Tables in Markdown, and those in CSV that are not there in Markdown.
@@ -302,10 +284,6 @@ mod tests {
             "l": [{"d": "e"}]}, "dtype": "f64", "seed": null, "wall_seconds": 1.5,
             "phases": [{"name": "p", "seconds": 2}]}"#,
         );
-        let facts = manifest(folder.path(), "m.json").unwrap();
-        let entries: Vec<(&str, &str)> = (facts.entries.iter())
-            .map(|(name, value)| (name.as_str(), value.as_str()))
-            .collect();
         let expected = [
             ("experiment", "x"),
             ("dtype", "f64"),
@@ -315,7 +293,9 @@ mod tests {
             ("n", "64, 128"),
             ("p", "2 s"),
         ];
-        assert_eq!(entries, expected);
+        let expected = expected.map(|(name, value)| (name.to_owned(), value.to_owned()));
+        let facts = manifest(folder.path(), "m.json").unwrap();
+        assert_eq!(facts.entries, expected);
         for json in ["", "{}", "[]", "{\"experiment\": 3, \"parameters\": {}}"] {
             write(json);
             let message = manifest(folder.path(), "m.json").unwrap_err().to_string();

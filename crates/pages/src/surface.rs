@@ -102,29 +102,20 @@ mod tests {
     fn decoded(surface: &Surface) -> TriangleMesh {
         let bytes = STANDARD.decode(&surface.data).unwrap();
         let (positions, rest) = bytes.split_at(6 * surface.vertices);
-        let length = if surface.has_normals {
-            positions.len()
-        } else {
-            0
-        };
+        let length = positions.len() * usize::from(surface.has_normals);
         let (normals, mut rest) = rest.split_at(length);
-        let step = surface.step();
-        let vertices = positions
-            .chunks_exact(6)
-            .map(|x| {
-                std::array::from_fn(|i| {
-                    let value = u16::from_le_bytes([x[2 * i], x[2 * i + 1]]);
-                    surface.bounds.lower[i] + step[i] * f64::from(value)
-                })
-            })
-            .collect();
-        let normals = normals.chunks_exact(6).map(|n| {
-            std::array::from_fn(|i| {
-                let value = u16::from_le_bytes([n[2 * i], n[2 * i + 1]]);
-                2.0 * f64::from(value) / STEPS - 1.0
-            })
-        });
-        let normals: Vec<[f64; 3]> = normals.collect();
+        let triples = |bytes: &[u8]| -> Vec<[f64; 3]> {
+            let value = |bytes: &[u8]| f64::from(u16::from_le_bytes([bytes[0], bytes[1]]));
+            let triples = bytes.chunks_exact(6);
+            triples
+                .map(|x| [0, 2, 4].map(|at| value(&x[at..])))
+                .collect()
+        };
+        let (low, step) = (surface.bounds.lower, surface.step());
+        let vertices = triples(positions).into_iter();
+        let vertices = vertices.map(|x| [0, 1, 2].map(|i| low[i] + step[i] * x[i]));
+        let normals = triples(normals).into_iter();
+        let normals = normals.map(|n| n.map(|value| 2.0 * value / STEPS - 1.0));
         let (mut next, mut corners) = (0, Vec::new());
         while let [_, ..] = rest {
             let (mut distance, mut shift) = (0, 0);
@@ -141,13 +132,11 @@ mod tests {
             next += u32::from(distance == 0);
         }
         assert_eq!(next as usize, surface.vertices);
+        let faces = corners.chunks_exact(3).map(|f| [f[0], f[1], f[2]]);
         TriangleMesh {
-            vertices,
-            faces: corners
-                .chunks_exact(3)
-                .map(|f| [f[0], f[1], f[2]])
-                .collect(),
-            normals: surface.has_normals.then_some(normals),
+            vertices: vertices.collect(),
+            faces: faces.collect(),
+            normals: surface.has_normals.then(|| normals.collect()),
         }
     }
 
@@ -155,25 +144,13 @@ mod tests {
     fn largest_error(mesh: &TriangleMesh, surface: &Surface) -> f64 {
         let back = decoded(surface);
         assert_eq!(back.faces.len(), mesh.faces.len());
-        let step = surface.step();
-        let pairs = mesh
-            .faces
-            .as_flattened()
-            .iter()
-            .zip(back.faces.as_flattened());
-        pairs
-            .flat_map(|(&a, &b)| {
-                let (x, y) = (mesh.vertices[a as usize], back.vertices[b as usize]);
-                (0..3).map(move |i| {
-                    let error = (x[i] - y[i]).abs();
-                    if step[i] > 0.0 {
-                        error / step[i]
-                    } else {
-                        error
-                    }
-                })
-            })
-            .fold(0.0, f64::max)
+        let step = surface.step().map(|s| if s > 0.0 { s } else { 1.0 });
+        let corners = mesh.faces.as_flattened().iter();
+        let errors = corners.zip(back.faces.as_flattened()).flat_map(|(&a, &b)| {
+            let (x, y) = (mesh.vertices[a as usize], back.vertices[b as usize]);
+            [0, 1, 2].map(|i| (x[i] - y[i]).abs() / step[i])
+        });
+        errors.fold(0.0, f64::max)
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::text::inline;
 /// A table of text, its columns of numbers aligned right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
-    caption: String,
+    pub(crate) caption: String,
     head: Vec<String>,
     rows: Vec<Vec<String>>,
     /// Whether the cells are Markdown.
@@ -17,10 +17,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table from its parts.
-    ///
-    /// # Errors
-    /// [`Error::Table`] without columns, and for rows of other lengths.
+    /// A table from its parts: a column or more, and rows of as many cells.
     pub fn new(
         caption: impl Into<String>,
         head: impl IntoIterator<Item = impl Into<String>>,
@@ -48,9 +45,6 @@ impl Table {
     }
 
     /// A table from CSV with a head.
-    ///
-    /// # Errors
-    /// [`Error::Table`] if it cannot be read; as [`Table::new`].
     pub fn from_csv(caption: impl Into<String>, csv: &str) -> Result<Self> {
         let caption = caption.into();
         let failed = |error: csv::Error| Error::Table {
@@ -71,19 +65,15 @@ impl Table {
     }
 
     /// The first table of a Markdown text, such as `report::Table::to_markdown` writes.
-    ///
-    /// # Errors
-    /// [`Error::Table`] without one; as [`Table::new`].
     pub fn from_markdown(caption: impl Into<String>, markdown: &str) -> Result<Self> {
         let mut rows: Vec<Vec<String>> = Vec::new();
         for (event, range) in Parser::new_ext(markdown, Options::ENABLE_TABLES).into_offset_iter() {
             match event {
                 Event::Start(Tag::TableHead | Tag::TableRow) => rows.push(Vec::new()),
                 Event::Start(Tag::TableCell) => {
-                    let cell = markdown[range].trim().to_owned();
-                    rows.last_mut()
-                        .into_iter()
-                        .for_each(|row| row.push(cell.clone()));
+                    if let Some(row) = rows.last_mut() {
+                        row.push(markdown[range].trim().to_owned());
+                    }
                 }
                 Event::End(TagEnd::Table) => break,
                 _ => {}
@@ -99,13 +89,6 @@ impl Table {
         let mut table = Self::new(caption, head, rows)?;
         table.marked = true;
         Ok(table)
-    }
-
-    /// The table under another caption.
-    #[must_use]
-    pub(crate) fn with_caption(mut self, caption: &str) -> Self {
-        caption.clone_into(&mut self.caption);
-        self
     }
 
     /// Names of the columns.

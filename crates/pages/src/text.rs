@@ -1,44 +1,28 @@
 //! Running text.
 
-use maud::{Markup, PreEscaped, Render};
+use maud::{Markup, PreEscaped};
 use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd, html};
 
-/// A paragraph, or several.
+/// A paragraph of text as it is.
 ///
 /// ```
-/// use pages::Text;
-/// let [plain, marked] = [Text::from("2 < 3 `n`"), Text::markdown("2 < 3 `n`")];
-/// assert_eq!(maud::html!((plain)).0, "<p>2 &lt; 3 `n`</p>");
-/// assert_eq!(maud::html!((marked)).0, "<p>2 &lt; 3 <code>n</code></p>\n");
+/// assert_eq!(pages::paragraph("2 < 3 `n`").0, "<p>2 &lt; 3 `n`</p>");
+/// assert_eq!(pages::markdown("2 < 3 `n`").0, "<p>2 &lt; 3 <code>n</code></p>\n");
 /// ```
-#[derive(Clone, Debug)]
-pub struct Text(Markup);
-
-impl Text {
-    /// Text in Markdown, headings one level down. HTML in it is shown as it is written; of links
-    /// to files only the text is left, as a page is a file of its own.
-    pub fn markdown(text: &str) -> Self {
-        Self(rendered(events(text, |_| None)))
-    }
-
-    /// The same with links to some files that lead to a section of the page; `section` gives its
-    /// name.
-    pub(crate) fn linked(text: &str, section: impl Fn(&str) -> Option<String>) -> Self {
-        Self(rendered(events(text, section)))
-    }
+pub fn paragraph(text: &str) -> Markup {
+    maud::html! { p { (text) } }
 }
 
-impl<T: AsRef<str>> From<T> for Text {
-    fn from(text: T) -> Self {
-        let text = text.as_ref();
-        Self(maud::html! { p { (text) } })
-    }
+/// Text in Markdown, headings one level down. HTML in it is shown as it is written; of links
+/// to files only the text is left, as a page is a file of its own.
+pub fn markdown(text: &str) -> Markup {
+    linked(text, |_| None)
 }
 
-impl Render for Text {
-    fn render(&self) -> Markup {
-        self.0.clone()
-    }
+/// The same with links to some files that lead to a section of the page; `section` gives its
+/// name.
+pub(crate) fn linked(text: &str, section: impl Fn(&str) -> Option<String>) -> Markup {
+    rendered(events(text, section))
 }
 
 /// Markdown within a line.
@@ -83,17 +67,13 @@ fn events<'a>(
             }
             Event::End(TagEnd::Link) => return kept.then_some(event),
             Event::Start(Tag::Heading { level, .. }) | Event::End(TagEnd::Heading(level)) => {
-                *level = below(*level);
+                let below = HeadingLevel::try_from(*level as usize + 1);
+                *level = below.unwrap_or(HeadingLevel::H6);
             }
             _ => {}
         }
         Some(event)
     })
-}
-
-/// The next lower level of headings.
-fn below(level: HeadingLevel) -> HeadingLevel {
-    HeadingLevel::try_from(level as usize + 1).unwrap_or(HeadingLevel::H6)
 }
 
 #[cfg(test)]
@@ -104,10 +84,9 @@ mod tests {
     #[test]
     fn links_lead_outside_or_to_sections() {
         let text = "[a](b) [c](https://d.org) ![e](f.png) <b>g</b> javascript: [x](javascript:y)";
-        let Text(PreEscaped(html)) =
-            Text::linked(text, |target| (target == "b").then(|| "b-2".to_owned()));
+        let html = linked(text, |target| (target == "b").then(|| "b-2".to_owned()));
         assert_eq!(
-            html,
+            html.0,
             "<p><a href=\"#b-2\">a</a> <a href=\"https://d.org\">c</a> e &lt;b&gt;g&lt;/b&gt; javascript: x</p>\n"
         );
         assert_eq!(inline("[a](b) **c**").0, "a <strong>c</strong>");
@@ -126,7 +105,8 @@ mod tests {
         #[test]
         fn no_text_becomes_a_script_or_a_picture(text in text(), tag in 0..3_usize) {
             let tag = ["<script>", "<img src=x onerror=y>", "[x](<javascript:\">)"][tag];
-            for Text(PreEscaped(html)) in [Text::markdown(&format!("{text}{tag}")), Text::from(format!("{text}{tag}"))] {
+            let text = format!("{text}{tag}");
+            for PreEscaped(html) in [markdown(&text), paragraph(&text)] {
                 prop_assert!(!html.contains("<script") && !html.contains("<img"), "{html}");
                 prop_assert!(!html.contains("href=\"j"), "{html}");
             }

@@ -1,7 +1,7 @@
 //! Surfaces to turn.
 
 use geometry::measure::BoundingBox;
-use maud::{Markup, PreEscaped, Render, html};
+use maud::{Markup, PreEscaped, html};
 use render::View;
 use surfaces::TriangleMesh;
 
@@ -9,74 +9,42 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::surface::Surface;
 
-/// Surfaces, such as the steps of a flow, of which one is shown and can be turned. A picture stands
-/// in for them until they are started, and wherever they cannot be: without JavaScript or WebGL,
+/// Surfaces, such as the steps of a flow, of which one is shown and can be turned: one or more with a label each, all seen in one scale
+/// and from one direction. A picture stands in for them until they are started, and wherever they cannot be: without JavaScript or WebGL,
 /// and on paper.
-#[derive(Clone, Debug)]
-pub struct Viewer {
-    caption: String,
-    poster: Image,
+///
+/// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
+/// those of the triangles around a vertex, weighted by area.
+pub fn viewer<'a>(
+    caption: &str,
+    poster: &Image,
     view: View,
-    surfaces: Vec<Surface>,
-    /// Of the ball that all surfaces lie in.
-    centre: [f64; 3],
-    radius: f64,
-}
-
-impl Viewer {
-    /// A viewer of one surface or more with a label each. All are seen in one scale and from one direction.
-    ///
-    /// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
-    /// those of the triangles around a vertex, weighted by area.
-    ///
-    /// # Errors
-    /// [`Error::Empty`](crate::Error::Empty) for a surface without faces,
-    /// [`Error::Surface`](crate::Error::Surface) for meshes that cannot be shown,
-    /// [`Error::Render`](crate::Error::Render) for angles that are not finite or beyond the poles.
-    pub fn new<'a>(
-        caption: impl Into<String>,
-        poster: Image,
-        view: View,
-        surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
-    ) -> Result<Self> {
-        view.check()?;
-        let (mut encoded, mut points) = (Vec::new(), Vec::new());
-        for (label, mesh) in surfaces {
-            encoded.push(Surface::new(label, mesh)?);
-            let corners = mesh.faces.as_flattened().iter();
-            points.extend(corners.map(|&vertex| mesh.vertices[vertex as usize]));
-        }
-        let (centre, radius) = ball(&points);
-        Ok(Self {
-            caption: caption.into(),
-            poster,
-            view,
-            surfaces: encoded,
-            centre,
-            radius,
-        })
+    surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
+) -> Result<Markup> {
+    view.check()?;
+    let (mut encoded, mut points) = (Vec::new(), Vec::new());
+    for (label, mesh) in surfaces {
+        encoded.push(Surface::new(label, mesh)?);
+        let corners = mesh.faces.as_flattened().iter();
+        points.extend(corners.map(|&vertex| mesh.vertices[vertex as usize]));
     }
-}
-
-impl Render for Viewer {
-    fn render(&self) -> Markup {
-        html! {
-            figure.viewer data-caption=(self.caption) data-up=(self.view.up.index())
-                data-azimuth=(self.view.azimuth) data-elevation=(self.view.elevation)
-                data-centre=(listed(self.centre)) data-radius=(format!("{:e}", self.radius)) {
-                div.stage { (self.poster.html(&self.caption)) }
-                // No script: a block of data, which browsers neither run nor show.
-                @for surface in &self.surfaces {
-                    script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
-                        data-faces=(surface.faces) data-normals[surface.has_normals]
-                        data-low=(listed(surface.bounds.lower)) data-step=(listed(surface.step())) {
-                        (PreEscaped(&surface.data))
-                    }
+    let (centre, radius) = ball(&points);
+    Ok(html! {
+        figure.viewer data-caption=(caption) data-up=(view.up.index())
+            data-azimuth=(view.azimuth) data-elevation=(view.elevation)
+            data-centre=(listed(centre)) data-radius=(format!("{radius:e}")) {
+            div.stage { (poster.html(caption)) }
+            // No script: a block of data, which browsers neither run nor show.
+            @for surface in &encoded {
+                script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
+                    data-faces=(surface.faces) data-normals[surface.has_normals]
+                    data-low=(listed(surface.bounds.lower)) data-step=(listed(surface.step())) {
+                    (PreEscaped(&surface.data))
                 }
-                figcaption { (self.caption) }
             }
+            figcaption { (caption) }
         }
-    }
+    })
 }
 
 fn listed(values: [f64; 3]) -> String {

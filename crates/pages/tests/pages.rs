@@ -3,7 +3,7 @@
 use geometry::shapes::Ball;
 use geometry::{Grid, UpAxis, phase_field};
 use pages::{
-    Details, Error, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer,
+    Error, Facts, Image, Page, Section, Table, View, figure, frames, markdown, paragraph, viewer,
 };
 use surfaces::{TriangleMesh, phase_field_surface};
 
@@ -23,21 +23,21 @@ fn picture() -> Image {
 
 /// A page with every kind of block, all with the same text.
 fn page(text: &str) -> Page {
-    let frames = vec![(text.to_owned(), picture()), ("1".to_owned(), picture())];
+    let pictures = [(text.to_owned(), picture()), ("1".to_owned(), picture())];
     let ball = ball();
     let surfaces = [(text, &ball), ("1", &ball)];
-    let details = Details::new(text)
-        .with(Facts::new().with(text, text))
-        .with(Text::from(text))
-        .with(Text::markdown(text));
+    let inner = Section::new(text)
+        .with(Facts::default().with(text, text))
+        .with(paragraph(text))
+        .with(markdown(text));
     Page::new(text).with_lead(text).with(
         Section::new(text)
-            .with(Text::from(text))
-            .with(Figure::new(picture(), text))
+            .with(paragraph(text))
+            .with(figure(&picture(), text))
             .with(Table::new(text, [text, "b"], [[text, "2"]]).unwrap())
-            .with(Frames::new(text, frames))
-            .with(Viewer::new(text, picture(), View::default(), surfaces).unwrap())
-            .with(details),
+            .with(frames(text, &pictures))
+            .with(viewer(text, &picture(), View::default(), surfaces).unwrap())
+            .with(inner),
     )
 }
 
@@ -126,7 +126,7 @@ fn the_same_page_gives_the_same_bytes_and_only_what_it_needs() {
     assert_eq!(html, page("text").to_html());
     assert!(html.contains("createShader") && html.contains("figure.frames"));
     let simple = Page::new("t")
-        .with(Section::new("s").with(Text::from("p")))
+        .with(Section::new("s").with(paragraph("p")))
         .to_html();
     assert!(!simple.contains("createShader") && !simple.contains("figure.frames"));
     // Four kilobytes of style, three of checks, and hardly anything else.
@@ -171,11 +171,8 @@ fn viewers_turn_about_the_axis_that_points_up() {
             up,
             ..View::default()
         };
-        let viewer = Viewer::new("ball", picture(), view, [("0", &ball())]).unwrap();
-        let html = Page::new("page")
-            .with(Section::new("s").with(viewer))
-            .to_html();
-        assert!(html.contains(&format!("data-up=\"{}\"", up.index())));
+        let html = viewer("ball", &picture(), view, [("0", &ball())]).unwrap();
+        assert!(html.0.contains(&format!("data-up=\"{}\"", up.index())));
     }
 }
 
@@ -186,6 +183,6 @@ fn views_that_cannot_be_are_refused() {
         elevation: 90.5,
         ..View::default()
     };
-    let error = Viewer::new("ball", picture(), view, [("0", &ball)]).unwrap_err();
+    let error = viewer("ball", &picture(), view, [("0", &ball)]).unwrap_err();
     assert!(matches!(error, Error::Render(_)), "{error}");
 }

@@ -36,9 +36,6 @@ impl Default for View {
 
 impl View {
     /// Accepts finite angles, and elevations from -90 to 90 degrees.
-    ///
-    /// # Errors
-    /// [`geometry::Error::InvalidParameter`] for others.
     pub fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;
         let range = "between -90 and 90 degrees";
@@ -87,10 +84,7 @@ pub(crate) struct Camera {
 
 impl Camera {
     /// The camera that comes as close as it can with all points, which are around `centre`, in a
-    /// picture of `size` pixels.
-    ///
-    /// # Errors
-    /// [`geometry::Error::InvalidParameter`] if the points have no extent in the picture.
+    /// picture of `size` pixels. The points must have an extent in it.
     pub fn fit(
         orientation: Orientation,
         points: &[DVec3],

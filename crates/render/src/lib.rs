@@ -47,6 +47,9 @@
 //! - Lights are fixed to the camera, so that every view is lit alike.
 //! - Light is computed and blended linearly; colours given and pixels returned are sRGB.
 //! - Angles are in degrees, lengths in the units of the surface, sizes of pictures in pixels.
+//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod camera;
 mod error;

@@ -11,10 +11,7 @@ pub(crate) const LARGEST_SIDE: u32 = 8192;
 /// How long each picture of an animation is shown, in milliseconds.
 const DELAY: u16 = 200;
 
-/// Accepts sizes that can be drawn.
-///
-/// # Errors
-/// [`Error::PictureSize`].
+/// Accepts sizes that can be drawn: sides from 1 to 8192.
 pub fn checked_size(size: [u32; 2]) -> Result<[u32; 2], Error> {
     if size.iter().all(|side| (1..=LARGEST_SIDE).contains(side)) {
         return Ok(size);
@@ -30,10 +27,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Takes over pixels.
-    ///
-    /// # Errors
-    /// The sides must be from 1 to 8192, and the pixels as many as their product.
+    /// Takes over pixels, which must be as many as the [size](checked_size) says.
     pub fn new(size: [u32; 2], pixels: Vec<[u8; 4]>) -> Result<Self, Error> {
         let [width, height] = checked_size(size)?.map(|side| side as usize);
         let actual = pixels.len();
@@ -63,9 +57,6 @@ impl Picture {
     }
 
     /// The bytes of a PNG file.
-    ///
-    /// # Errors
-    /// [`Error::Encode`].
     pub fn to_png(&self) -> Result<Vec<u8>, Error> {
         let (mut bytes, opaque) = (Vec::new(), self.is_opaque());
         let mut writer = encoder(&mut bytes, self.size, opaque).write_header()?;
@@ -89,20 +80,14 @@ impl Picture {
     }
 
     /// Writes a PNG file, atomically (see [`write_atomically`]).
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let bytes = self.to_png()?;
         Ok(write_atomically(path, |out| out.write_all(&bytes))?)
     }
 }
 
-/// The bytes of an animated PNG file (APNG): `count` pictures shown one after the other, for ever, five a
-/// second. Viewers that know no APNG show the first picture. Each is made twice, so that there is never more than one in memory.
-///
-/// # Errors
-/// There must be a picture, and all must have one size; [`Error::Encode`], and the errors of `frame`.
+/// The bytes of an animated PNG file (APNG): `count` pictures, one at least and all of one size, shown one after the other, for ever,
+/// five a second. Viewers that know no APNG show the first picture. Each is made twice, so that there is never more than one in memory.
 pub fn animation<E: From<Error>>(
     count: usize,
     frame: impl Fn(usize) -> Result<Picture, E>,

@@ -65,9 +65,6 @@ impl Scene {
     /// The surface `u = 0` of a phase field, which is positive inside: that of the distances
     /// `-(4 eps / 3) atanh u`, smoothed a little, so that edges are rounded over two cells and have no
     /// teeth; what is smooth moves by `h^2 / 3` times the mean curvature, which no picture shows.
-    ///
-    /// # Errors
-    /// `u` must be finite, and `eps` finite and positive.
     pub fn new(u: &impl PhaseField<3>, eps: f64) -> Result<Self, Error> {
         let distance = distances_from_phase_field(u, eps)?;
         Ok(Self::of_mesh(isosurface(&distance.smoothed())?))
@@ -114,9 +111,6 @@ impl Scene {
 
     /// Gives another colour to the part of the surface where a mask of zeros and ones, smoothed
     /// over a cell, exceeds one half: an inpainting domain, for example.
-    ///
-    /// # Errors
-    /// The mask must be finite.
     pub fn highlight_mask(mut self, mask: &Field<3>, colour: Rgb) -> Result<Self, Error> {
         mask.check_finite()?;
         let mask = Stored::whole(mask.clone()).smoothed().field()?;
@@ -126,9 +120,6 @@ impl Scene {
     }
 
     /// Gives every vertex of the surface its own colour, interpolated between them.
-    ///
-    /// # Errors
-    /// There must be as many colours as vertices.
     pub fn painted(mut self, colours: Vec<Rgb>) -> Result<Self, Error> {
         let (count, vertices) = (colours.len(), self.mesh.vertices.len());
         let range = "that of the vertices";
@@ -151,9 +142,6 @@ impl Scene {
     }
 
     /// Draws the picture of `[width, height]` pixels.
-    ///
-    /// # Errors
-    /// A number out of range, nothing to frame, or a size that cannot be drawn.
     pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
         let size = checked_size(size)?;
         self.mesh.check(f64::MAX)?;

@@ -1,9 +1,11 @@
 //! Frame, grid, ticks and labels around a plot: shared by line charts and heat maps.
 
-use crate::axis::{Axis, Mapping, Scale, Ticks, Window};
+use glam::dvec2;
+
+use crate::axis::{Axis, Mapping, Ticks, Window};
 use crate::colour::{FRAME, GRID, INK, MINOR_GRID};
 use crate::font::{self, Align, TextStyle};
-use crate::geom::{Margins, Rect, point};
+use crate::geom::{Margins, Rect};
 use crate::style::Fonts;
 use crate::surface::Surface;
 
@@ -72,21 +74,21 @@ impl<'a> Ruler<'a> {
         let ticks = self.ticks_along(plot.width);
         let at = |value: f64| snap(plot.x + self.map.fraction(value) * plot.width);
         for (x, length) in marks(&ticks, at) {
-            let ends = [point(x, plot.bottom() - length), point(x, plot.bottom())];
+            let ends = [dvec2(x, plot.bottom() - length), dvec2(x, plot.bottom())];
             surface.stroke(&ends, 1.0, FRAME);
         }
         let (em, number) = (self.fonts.tick, TextStyle::new(self.fonts.tick, INK));
         let y = plot.bottom() + TICK_GAP + 0.6 * em;
         for (value, label) in &ticks.major {
-            surface.text(label, point(at(*value), y), number);
+            surface.text(label, dvec2(at(*value), y), number);
         }
         let below = y + 0.6 * em + LABEL_GAP + 0.5 * self.fonts.label;
         if let Some(factor) = &ticks.factor {
-            let corner = point(plot.right(), below);
+            let corner = dvec2(plot.right(), below);
             surface.text(factor, corner, number.aligned(Align::Right));
         }
         let label = TextStyle::new(self.fonts.label, INK);
-        surface.text(self.label, point(plot.centre().x, below), label);
+        surface.text(self.label, dvec2(plot.centre().x, below), label);
     }
 
     /// Ticks, numbers and label of a vertical axis at the left edge of `area`, or outside at its right edge.
@@ -99,19 +101,19 @@ impl<'a> Ruler<'a> {
         let ticks = self.ticks_up(area.height);
         let at = |value: f64| snap(area.bottom() - self.map.fraction(value) * area.height);
         for (y, length) in marks(&ticks, at) {
-            surface.stroke(&[point(edge, y), point(edge + length, y)], 1.0, FRAME);
+            surface.stroke(&[dvec2(edge, y), dvec2(edge + length, y)], 1.0, FRAME);
         }
         let number = TextStyle::new(self.fonts.tick, INK);
         for (value, label) in &ticks.major {
-            let place = point(edge + beside, at(*value));
+            let place = dvec2(edge + beside, at(*value));
             surface.text(label, place, number.aligned(align));
         }
         if let Some(factor) = &ticks.factor {
-            let above = point(area.x, area.y - 0.9 * self.fonts.tick);
+            let above = dvec2(area.x, area.y - 0.9 * self.fonts.tick);
             surface.text(factor, above, number.aligned(Align::Left));
         }
         let away = self.widest(&ticks) + LABEL_GAP + 0.5 * self.fonts.label;
-        let middle = point(edge + beside + side * away, area.centre().y);
+        let middle = dvec2(edge + beside + side * away, area.centre().y);
         let upwards = TextStyle::new(self.fonts.label, INK).upwards();
         surface.text(self.label, middle, upwards);
     }
@@ -150,16 +152,14 @@ impl<'a> Axes<'a> {
         let (along, up) = (self.x.ticks_along(plot.width), self.y.ticks_up(plot.height));
         let level = |value: f64| {
             let y = snap(plot.bottom() - self.y.map.fraction(value) * plot.height);
-            [point(plot.x, y), point(plot.right(), y)]
+            [dvec2(plot.x, y), dvec2(plot.right(), y)]
         };
-        if self.y.map.scale == Scale::Log {
-            for &value in &up.minor {
-                surface.stroke(&level(value), 1.0, MINOR_GRID);
-            }
+        for &value in &up.minor {
+            surface.stroke(&level(value), 1.0, MINOR_GRID);
         }
         for (value, _) in &along.major {
             let x = snap(plot.x + self.x.map.fraction(*value) * plot.width);
-            surface.stroke(&[point(x, plot.y), point(x, plot.bottom())], 1.0, GRID);
+            surface.stroke(&[dvec2(x, plot.y), dvec2(x, plot.bottom())], 1.0, GRID);
         }
         for (value, _) in &up.major {
             surface.stroke(&level(*value), 1.0, GRID);

@@ -1,7 +1,9 @@
 //! Axes: ranges, the map from values to positions, ticks and their labels.
 
+use glam::{DVec2, dvec2};
+
 use crate::error::{Error, Result};
-use crate::geom::{Point, Rect, point};
+use crate::geom::Rect;
 
 /// How values are spread along an axis or a colour bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,9 +161,9 @@ impl Window {
         (self.y.high - self.y.low) / (self.x.high - self.x.low)
     }
 
-    pub fn place(&self, plot: &Rect, [x, y]: [f64; 2]) -> Point {
+    pub fn place(&self, plot: &Rect, [x, y]: [f64; 2]) -> DVec2 {
         let (right, up) = (self.x.fraction(x), self.y.fraction(y));
-        point(
+        dvec2(
             plot.x + right * plot.width,
             plot.bottom() - up * plot.height,
         )

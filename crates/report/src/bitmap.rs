@@ -2,11 +2,12 @@
 
 use std::fmt::Debug;
 
+use glam::{DVec2, dvec2};
 use plotters::prelude::{BitMapBackend, Color, DrawingBackend, RGBColor};
 use srgb::Rgb;
 
-use crate::font::{self, Align, TextStyle};
-use crate::geom::{self, Point, Rect, dash, point};
+use crate::font::{self, Align, HALF_CAPITAL, TOP_TO_BASELINE, TextStyle};
+use crate::geom::{self, Rect, dash, distance};
 use crate::style::Marker;
 use crate::surface::{PNG_SCALE, Surface};
 
@@ -28,21 +29,16 @@ fn ink(Rgb(r, g, b): Rgb) -> RGBColor {
 }
 
 impl PngSurface<'_> {
-    fn stroke(&mut self, points: &[Point], width: f64, colour: Rgb) {
+    fn stroke(&mut self, points: &[DVec2], width: f64, colour: Rgb) {
         let half = 0.5 * width;
         for pair in points.windows(2) {
             let (a, b) = (pair[0], pair[1]);
-            let length = a.distance(b);
+            let length = distance(a, b);
             if length == 0.0 {
                 continue;
             }
-            let (nx, ny) = (half * (a.y - b.y) / length, half * (b.x - a.x) / length);
-            let quad = vec![
-                point(a.x + nx, a.y + ny),
-                point(b.x + nx, b.y + ny),
-                point(b.x - nx, b.y - ny),
-                point(a.x - nx, a.y - ny),
-            ];
+            let aside = half * (b - a).perp() / length;
+            let quad = vec![a + aside, b + aside, b - aside, a - aside];
             self.fill(&[quad], colour);
         }
         let inner = 1..points.len().saturating_sub(1);
@@ -53,20 +49,20 @@ impl PngSurface<'_> {
 }
 
 /// Column and row of the sample at a place in layout units.
-fn sampled(p: Point) -> (i32, i32) {
+fn sampled(p: DVec2) -> (i32, i32) {
     let sample = |c: f64| (c * SCALE).round() as i32;
     (sample(p.x), sample(p.y))
 }
 
 impl Surface for PngSurface<'_> {
-    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) {
+    fn dashed(&mut self, points: &[DVec2], width: f64, colour: Rgb, pattern: &[f64]) {
         for piece in dash(points, pattern) {
             self.stroke(&piece, width, colour);
         }
     }
 
     /// One horizontal span of samples at a time. A sample belongs to the region if its centre does.
-    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) {
+    fn fill(&mut self, loops: &[Vec<DVec2>], colour: Rgb) {
         let ((width, height), ink) = (self.0.get_size(), ink(colour).stroke_width(1));
         let sample =
             |c: f64, limit: u32| (c * SCALE - 0.5).ceil().clamp(0.0, f64::from(limit)) as i32;
@@ -81,7 +77,7 @@ impl Surface for PngSurface<'_> {
                 let (upper, lower) = if a.y <= b.y { (a, b) } else { (b, a) };
                 for row in sample(upper.y, height)..sample(lower.y, height) {
                     let t = ((f64::from(row) + 0.5) / SCALE - upper.y) / (lower.y - upper.y);
-                    crossings[(row - first) as usize].push(upper.towards(lower, t).x);
+                    crossings[(row - first) as usize].push(upper.x + t * (lower.x - upper.x));
                 }
             }
         }
@@ -96,7 +92,7 @@ impl Surface for PngSurface<'_> {
         }
     }
 
-    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) {
+    fn markers(&mut self, marker: Marker, places: &[DVec2], colour: Rgb) {
         for &at in places {
             self.fill(
                 &[marker.outline(at, Marker::RADIUS + Marker::RIM)],
@@ -106,19 +102,15 @@ impl Surface for PngSurface<'_> {
         }
     }
 
-    fn text(&mut self, line: &str, at: Point, style: TextStyle) {
-        let (em, rise) = (style.em * SCALE, style.rise());
+    fn text(&mut self, line: &str, at: DVec2, style: TextStyle) {
+        let em = style.em * SCALE;
         let width = font::width(line, em).round() as i32;
         let start = match style.align {
             Align::Left => 0,
             Align::Centre => -width / 2,
             Align::Right => -width,
         };
-        let top = if style.vertical {
-            sampled(point(at.x - rise, at.y))
-        } else {
-            sampled(point(at.x, at.y - rise))
-        };
+        let top = sampled(style.below(at, HALF_CAPITAL - TOP_TO_BASELINE));
         font::rasterize(line, em, |along, down, covered| {
             let along = start + along;
             let (x, y) = if style.vertical {
@@ -133,8 +125,8 @@ impl Surface for PngSurface<'_> {
 
     fn image(&mut self, area: Rect, columns: usize, cells: &[Rgb], _: bool) {
         let rows = cells.len() / columns;
-        let (x0, y0) = sampled(point(area.x, area.y));
-        let (x1, y1) = sampled(point(area.right(), area.bottom()));
+        let (x0, y0) = sampled(dvec2(area.x, area.y));
+        let (x1, y1) = sampled(dvec2(area.right(), area.bottom()));
         let [width, height] = [x1 - x0, y1 - y0].map(|side| side.max(1) as usize);
         let row = |y: usize| y * rows / height * columns;
         let cell = |k: usize| cells[row(k / width) + k % width * columns / width];
@@ -181,7 +173,7 @@ mod tests {
 
     const BLACK: Rgb = Rgb(0, 0, 0);
 
-    fn ring(centre: f64, half: f64) -> Vec<Point> {
+    fn ring(centre: f64, half: f64) -> Vec<DVec2> {
         let side = 2.0 * half;
         Rect::new(centre - half, centre - half, side, side)
             .corners()
@@ -209,14 +201,9 @@ mod tests {
 
     #[test]
     fn hairlines_are_sharp_and_wide_curves_without_holes() {
-        let cross = [
-            point(5.0, 5.0),
-            point(35.0, 35.0),
-            point(35.0, 5.0),
-            point(5.0, 35.0),
-        ];
+        let cross = [[5.0, 5.0], [35.0, 35.0], [35.0, 5.0], [5.0, 35.0]].map(DVec2::from);
         let bytes = png((40, 40), |s| {
-            s.stroke(&[point(5.0, 2.5), point(35.0, 2.5)], 1.0, BLACK);
+            s.stroke(&[dvec2(5.0, 2.5), dvec2(35.0, 2.5)], 1.0, BLACK);
             s.stroke(&cross, 6.0, BLACK);
         });
         let picture = image::load_from_memory(&bytes).unwrap().into_rgb8();

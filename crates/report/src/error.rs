@@ -31,7 +31,6 @@ pub enum Error {
          a side and at least 40 for every panel"
     )]
     FigureSize {
-        /// Width in layout units (CSS pixels).
         width: f64,
         /// Height in layout units, 0 if it is not known.
         height: f64,

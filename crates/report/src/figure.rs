@@ -3,11 +3,13 @@
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
+use glam::{DVec2, dvec2};
+
 use crate::bitmap;
 use crate::colour::{GREY, INK};
 use crate::error::{Error, Result};
 use crate::font::{self, AIR, Align, LEADING, TextStyle};
-use crate::geom::{Margins, Point, Rect, point};
+use crate::geom::{Margins, Rect};
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
 use crate::panel::{Drawable, Panel};
@@ -15,29 +17,19 @@ use crate::style::Fonts;
 use crate::surface::Surface;
 use crate::svg;
 
-/// A figure: panels row by row on a grid.
-///
-/// Sizes are in layout units, one CSS pixel each when a README shows the figure at its own width.
-/// The PNG has two pixels per unit. Legends are below the panels, where they cover nothing.
+/// A figure: panels row by row on a grid. Legends are below the panels, where they cover nothing.
 #[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Heading above all panels; may be empty.
     pub title: String,
-    /// Panels, row by row.
-    pub panels: Vec<Panel>,
-    /// Number of panels in a row.
-    pub columns: usize,
-    /// Labels above the columns; may be empty.
-    pub column_labels: Vec<String>,
-    /// Labels left of the rows, read upwards; may be empty.
-    pub row_labels: Vec<String>,
-    /// One legend below all panels instead of one below each.
-    pub shared_legend: bool,
-    /// A remark in small type at the bottom; may be empty.
-    pub note: String,
-    /// Width; the height follows from the panels.
-    pub width: f64,
+    panels: Vec<Panel>,
+    columns: usize,
+    column_labels: Vec<String>,
+    row_labels: Vec<String>,
+    shared_legend: bool,
+    note: String,
+    width: f64,
 }
 
 impl<P: Into<Panel>> From<P> for Figure {
@@ -53,7 +45,7 @@ const SIDES: RangeInclusive<f64> = 80.0..=2600.0;
 const SMALLEST_PLOT: f64 = 40.0;
 
 impl Figure {
-    /// A figure without panels, 800 units wide.
+    /// A figure without panels, which come so many to a row; 800 units wide.
     pub fn new(title: impl Into<String>, columns: usize) -> Self {
         Self {
             title: title.into(),
@@ -79,7 +71,7 @@ impl Figure {
         self
     }
 
-    /// Labels the columns.
+    /// Labels the columns above them.
     pub fn with_column_labels<S: Into<String>>(
         mut self,
         labels: impl IntoIterator<Item = S>,
@@ -88,19 +80,19 @@ impl Figure {
         self
     }
 
-    /// Labels the rows; a line break in a label makes two lines.
+    /// Labels the rows left of them, read upwards; a line break in a label makes two lines.
     pub fn with_row_labels<S: Into<String>>(mut self, labels: impl IntoIterator<Item = S>) -> Self {
         self.row_labels = labels.into_iter().map(Into::into).collect();
         self
     }
 
-    /// Collects the legends of all panels below the figure.
+    /// Shows one legend below all panels instead of one below each.
     pub fn with_shared_legend(mut self) -> Self {
         self.shared_legend = true;
         self
     }
 
-    /// Adds a remark at the bottom.
+    /// Adds a remark in small type at the bottom.
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
@@ -113,27 +105,18 @@ impl Figure {
     }
 
     /// The figure as an SVG document. Text stays text, in a sans-serif family.
-    ///
-    /// # Errors
-    /// If there is nothing to draw, a range or array does not fit, or the width leaves no room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
         Ok(svg::svg(layout.size, |s| self.draw(&layout, s)))
     }
 
     /// The figure as a PNG file, two pixels per layout unit.
-    ///
-    /// # Errors
-    /// As [`Figure::to_svg`].
     pub fn to_png(&self) -> Result<Vec<u8>> {
         let layout = self.layout()?;
         Ok(bitmap::png(layout.size, |s| self.draw(&layout, s)))
     }
 
     /// Writes `<stem>.svg` and `<stem>.png`.
-    ///
-    /// # Errors
-    /// As [`Figure::to_svg`], or if a file cannot be written.
     pub fn write(&self, folder: &OutputDir, stem: &str) -> Result<()> {
         let (svg, png) = (self.to_svg()?, self.to_png()?);
         folder.write(&format!("{stem}.svg"), svg)?;
@@ -161,7 +144,7 @@ impl Figure {
         let strip = strip(fonts);
         let lines = self.row_labels.iter().map(|label| label.lines().count());
         let left = PADDING + strip * lines.max().unwrap_or(0) as f64;
-        let heading = match font::height(&self.title, fonts.heading, inner) {
+        let heading = match font::height(&self.title, Fonts::HEADING, inner) {
             0.0 => PADDING,
             height => PADDING + height + 5.0,
         };
@@ -172,14 +155,10 @@ impl Figure {
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
         let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
-        let shared = if self.shared_legend {
-            joined(&cells)
-        } else {
-            Vec::new()
-        };
-        let legend = Block::new(&shared, fonts.legend, inner);
+        let shared = self.shared_legend.then(|| joined(&cells));
+        let legend = Block::new(shared.as_deref().unwrap_or_default(), fonts.tick, inner);
         let note_top = legend_top + legend.height;
-        let height = (note_top + font::height(&self.note, fonts.note, inner) + PADDING).round();
+        let height = (note_top + font::height(&self.note, Fonts::NOTE, inner) + PADDING).round();
         let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
         if !SIDES.contains(&height) || cells.iter().any(small) {
             return refused(height);
@@ -198,28 +177,28 @@ impl Figure {
     fn draw(&self, layout: &Layout<'_>, surface: &mut dyn Surface) {
         let (fonts, columns, strip) = (layout.fonts, self.columns(), strip(layout.fonts));
         let (middle, inner) = (0.5 * self.width.round(), self.width - 2.0 * PADDING);
-        let heading = TextStyle::new(fonts.heading, INK);
-        draw_lines(surface, &self.title, heading, point(middle, PADDING), inner);
+        let heading = TextStyle::new(Fonts::HEADING, INK);
+        draw_lines(surface, &self.title, heading, dvec2(middle, PADDING), inner);
 
         let label = TextStyle::new(fonts.label, INK);
         for (text, cell) in self.column_labels.iter().zip(&layout.cells[..columns]) {
-            let at = point(cell.plot.centre().x, cell.outer.y - 0.5 * strip);
+            let at = dvec2(cell.plot.centre().x, cell.outer.y - 0.5 * strip);
             surface.text(text, at, label);
         }
         let rows = layout.cells.iter().step_by(columns);
         for (text, cell) in self.row_labels.iter().zip(rows) {
             for (k, line) in text.lines().enumerate() {
                 let x = PADDING + (k as f64 + 0.45) * strip;
-                surface.text(line, point(x, cell.plot.centre().y), label.upwards());
+                surface.text(line, dvec2(x, cell.plot.centre().y), label.upwards());
             }
         }
         for cell in &layout.cells {
             cell.draw(surface);
         }
-        let legend_top = point(middle, layout.legend_top);
+        let legend_top = dvec2(middle, layout.legend_top);
         layout.legend.draw(surface, legend_top);
-        let style = TextStyle::new(fonts.note, GREY).aligned(Align::Left);
-        let at = point(PADDING + 4.0, layout.note_top + AIR);
+        let style = TextStyle::new(Fonts::NOTE, GREY).aligned(Align::Left);
+        let at = dvec2(PADDING + 4.0, layout.note_top + AIR);
         draw_lines(surface, &self.note, style, at, inner);
     }
 }
@@ -243,10 +222,10 @@ fn strip(fonts: Fonts) -> f64 {
 }
 
 /// Draws wrapped lines below `top`, where they are centred or begin.
-fn draw_lines(surface: &mut dyn Surface, text: &str, style: TextStyle, top: Point, width: f64) {
+fn draw_lines(surface: &mut dyn Surface, text: &str, style: TextStyle, top: DVec2, width: f64) {
     for (k, line) in font::wrap(text, style.em, width).iter().enumerate() {
         let y = top.y + (k as f64 + 0.5) * LEADING * style.em;
-        surface.text(line, point(top.x, y), style);
+        surface.text(line, dvec2(top.x, y), style);
     }
 }
 
@@ -262,6 +241,7 @@ struct Layout<'a> {
 
 /// A panel and its place.
 struct Cell<'a> {
+    panel: &'a Panel,
     content: Box<dyn Drawable + 'a>,
     legend: Block,
     fonts: Fonts,
@@ -276,14 +256,15 @@ struct Cell<'a> {
 impl<'a> Cell<'a> {
     fn new(panel: &'a Panel, fonts: Fonts, text_width: f64, own_legend: bool) -> Result<Self> {
         let content = panel.checked(fonts)?;
-        let legend = if own_legend {
-            content.legend()
-        } else {
-            Vec::new()
-        };
+        let legend = own_legend.then(|| content.legend());
         Ok(Self {
+            panel,
             content,
-            legend: Block::new(&legend, fonts.legend, text_width),
+            legend: Block::new(
+                legend.as_deref().unwrap_or_default(),
+                fonts.tick,
+                text_width,
+            ),
             fonts,
             text_width,
             plot: Rect::new(0.0, 0.0, text_width - 70.0, 0.5 * text_width),
@@ -306,8 +287,8 @@ impl<'a> Cell<'a> {
 
     /// The title above, and the caption or the remark below.
     fn texts(&self) -> (&str, &str, TextStyle) {
-        let small = TextStyle::new(self.fonts.note, GREY).aligned(Align::Left);
-        match self.content.texts() {
+        let small = TextStyle::new(Fonts::NOTE, GREY).aligned(Align::Left);
+        match self.panel.texts() {
             [title, "", remark] => (title, remark, small),
             [title, caption, _] => (title, caption, TextStyle::new(self.fonts.label, INK)),
         }
@@ -333,22 +314,19 @@ impl<'a> Cell<'a> {
     fn draw(&self, surface: &mut dyn Surface) {
         let (plot, outer, middle) = (self.plot, self.outer, self.plot.centre().x);
         let (title, remark, style) = self.texts();
-        let (top, heading) = (
-            point(middle, outer.y),
-            TextStyle::new(self.fonts.title, INK),
-        );
-        draw_lines(surface, title, heading, top, self.text_width);
+        let (heading, top) = (TextStyle::new(self.fonts.title, INK), outer.y);
+        draw_lines(surface, title, heading, dvec2(middle, top), self.text_width);
         self.content.draw(surface, plot);
         let mut below = plot.bottom() + self.content.margins(plot.width, plot.height).bottom;
         let half = 0.5 * self.legend.width;
         let centre = middle.min(outer.right() - half).max(outer.x + half);
-        self.legend.draw(surface, point(centre, below));
+        self.legend.draw(surface, dvec2(centre, below));
         below += self.legend.height;
         let x = match style.align {
             Align::Left => outer.x + 4.0,
             _ => middle,
         };
-        let at = point(x, below + AIR);
+        let at = dvec2(x, below + AIR);
         draw_lines(surface, remark, style, at, self.text_width);
     }
 }
@@ -408,7 +386,7 @@ mod tests {
     const VERMILLION: Rgb = OKABE_ITO[1];
 
     /// The pixel at a place in layout units.
-    fn at(picture: &RgbImage, x: f64, y: f64) -> Rgb {
+    fn at(picture: &RgbImage, [x, y]: [f64; 2]) -> Rgb {
         let [r, g, b] = picture.get_pixel((2.0 * x) as u32, (2.0 * y) as u32).0;
         Rgb(r, g, b)
     }
@@ -459,10 +437,10 @@ mod tests {
         unit_square("Diagonal & more").with_curves([straight])
     }
 
-    /// The place of a point of a chart of the unit square, in layout units.
-    fn place(figure: &Figure, [x, y]: [f64; 2]) -> (f64, f64) {
+    /// The place of a point of the first panel, from 0 to 1, in layout units.
+    fn place(figure: &Figure, [x, y]: [f64; 2]) -> [f64; 2] {
         let plot = plot(figure);
-        (plot.x + x * plot.width, plot.bottom() - y * plot.height)
+        [plot.x + x * plot.width, plot.bottom() - y * plot.height]
     }
 
     #[test]
@@ -470,13 +448,12 @@ mod tests {
         let figure = Figure::from(diagonal());
         let (picture, size) = (picture(&figure), figure.layout().unwrap().size);
         assert_eq!(picture.dimensions(), (2 * size.0, 2 * size.1));
-        assert_eq!(at(&picture, 0.0, 0.0), Rgb::WHITE);
+        assert_eq!(at(&picture, [0.0; 2]), Rgb::WHITE);
         for t in [0.1, 0.25, 0.5, 0.75, 0.9] {
-            let (x, y) = place(&figure, [t, t]);
-            assert!(has_near(&picture, BLUE, [x, y], 0.5), "nothing at {t}");
-            let (x, y) = place(&figure, [t, 1.0 - t + 0.15]);
+            let [on, beside] = [t, 1.0 - t + 0.15].map(|y| place(&figure, [t, y]));
+            assert!(has_near(&picture, BLUE, on, 0.5), "nothing at {t}");
             assert!(
-                !has_near(&picture, BLUE, [x, y], 1.0),
+                !has_near(&picture, BLUE, beside, 1.0),
                 "something beside {t}"
             );
         }
@@ -494,8 +471,8 @@ mod tests {
         let figure = Figure::from(chart);
         let picture = picture(&figure);
         for t in [0.2, 0.5, 0.8] {
-            let (x, y) = place(&figure, [t, t]);
-            assert!(has_near(&picture, BLUE, [x, y], 0.6), "not straight at {t}");
+            let on = place(&figure, [t, t]);
+            assert!(has_near(&picture, BLUE, on, 0.6), "not straight at {t}");
         }
     }
 
@@ -504,10 +481,7 @@ mod tests {
         let points = [0.1, 0.4, f64::NAN, 0.6, 0.9].map(|t| [t, t]);
         let figure = Figure::from(unit_square("Gap").with_curves([Series::new("", points)]));
         let picture = picture(&figure);
-        let shown = |t: f64| {
-            let (x, y) = place(&figure, [t, t]);
-            has_near(&picture, BLUE, [x, y], 0.5)
-        };
+        let shown = |t: f64| has_near(&picture, BLUE, place(&figure, [t, t]), 0.5);
         assert!(shown(0.25) && shown(0.75) && !shown(0.5));
     }
 
@@ -638,10 +612,9 @@ mod tests {
         let points = points.with_symbols(Marker::Square);
         let figure = Figure::from(unit_square("").with_curves([points]));
         let picture = picture(&figure);
-        let (x, y) = place(&figure, [0.25, 0.5]);
+        let [x, y] = place(&figure, [0.25, 0.5]);
         assert!(has_near(&picture, BLUE, [x + 2.5, y + 2.5], 0.3));
-        let (x, y) = place(&figure, [0.4, 0.5]);
-        assert!(!has_near(&picture, BLUE, [x, y], 2.0));
+        assert!(!has_near(&picture, BLUE, place(&figure, [0.4, 0.5]), 2.0));
     }
 
     #[test]
@@ -657,13 +630,7 @@ mod tests {
             (plot.height / plot.width - 0.75).abs() < 0.01,
             "equal aspect"
         );
-        let colour = |x: f64, y: f64| {
-            at(
-                &picture,
-                plot.x + x / 4.0 * plot.width,
-                plot.bottom() - y / 3.0 * plot.height,
-            )
-        };
+        let colour = |x: f64, y: f64| at(&picture, place(&figure, [x / 4.0, y / 3.0]));
         assert_eq!(
             (colour(3.5, 0.5), colour(0.2, 2.8)),
             (viridis(1.0), viridis(f64::NAN))
@@ -699,13 +666,9 @@ mod tests {
         let (picture, layout) = (picture(&figure), figure.layout().unwrap());
         let (left, right) = (layout.cells[0].plot, layout.cells[1].plot);
         assert!((left.width - left.height).abs() <= 1.0);
-        let unit = left.width / 2.24;
         let at = |x: f64, y: f64| {
-            at(
-                &picture,
-                left.centre().x + x * unit,
-                left.centre().y - y * unit,
-            )
+            let place = place(&figure, [x, y].map(|c| 0.5 + c / 2.24));
+            at(&picture, place)
         };
         for (x, y) in [(0.75, 0.0), (0.0, -0.75), (0.9, 0.9)] {
             assert_eq!(at(x, y), VERMILLION);
@@ -783,7 +746,7 @@ mod tests {
             let figure = Figure::from(half(columns, rows));
             let (picture, plot) = (picture(&figure), plot(&figure));
             assert!((plot.height / plot.width - 2.0 / 3.0).abs() < 0.01);
-            let at = |x, y| at(&picture, plot.x + x * plot.width, plot.y + y * plot.height);
+            let at = |x: f64, y: f64| at(&picture, place(&figure, [x, y]));
             for y in [0.02, 0.5, 0.98] {
                 assert_eq!(
                     (at(0.02, y), at(0.45, y)),
@@ -824,7 +787,7 @@ mod tests {
         let white = |k: usize| (k % double[0] + k / double[0]) % 2;
         let board = (0..double[0] * double[1]).map(|k| opaque([255 * white(k) as u8; 3]));
         let (averaged, plot) = shown(double, board.collect());
-        let centre = at(&averaged, plot.centre().x, plot.centre().y);
+        let centre = at(&averaged, plot.centre().to_array());
         assert!(centre.0.abs_diff(188) <= 1, "{centre:?}");
     }
 

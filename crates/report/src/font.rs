@@ -6,6 +6,7 @@
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, GlyphId, ScaleFont};
+use glam::DVec2;
 use srgb::Rgb;
 
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
@@ -16,7 +17,7 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
 pub(crate) const HALF_CAPITAL: f64 = 0.365;
 
 /// Distance from the top of a line to the baseline, in em.
-const TOP_TO_BASELINE: f64 = 0.76;
+pub(crate) const TOP_TO_BASELINE: f64 = 0.76;
 
 /// Distance from one line of text to the next, in em.
 pub(crate) const LEADING: f64 = 1.35;
@@ -120,9 +121,10 @@ impl TextStyle {
         self
     }
 
-    /// From the top of the line down to the middle of the capitals.
-    pub fn rise(&self) -> f64 {
-        self.em * (TOP_TO_BASELINE - HALF_CAPITAL)
+    /// The place so many em below another one, as the letters stand.
+    pub fn below(&self, at: DVec2, down: f64) -> DVec2 {
+        let step = if self.vertical { DVec2::X } else { DVec2::Y };
+        at + down * self.em * step
     }
 }
 

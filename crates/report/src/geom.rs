@@ -4,45 +4,27 @@
 
 use std::f64::consts::TAU;
 
-/// A point in layout units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Point {
-    pub x: f64,
-    pub y: f64,
+use glam::{DVec2, dvec2};
+
+/// With one rounding, unlike [`DVec2::distance`].
+pub(crate) fn distance(a: DVec2, b: DVec2) -> f64 {
+    (a.x - b.x).hypot(a.y - b.y)
 }
 
-pub(crate) const fn point(x: f64, y: f64) -> Point {
-    Point { x, y }
-}
-
-impl Point {
-    pub fn distance(self, other: Self) -> f64 {
-        (self.x - other.x).hypot(self.y - other.y)
-    }
-
-    /// Distance to the segment from `a` to `b`.
-    fn distance_to(self, a: Self, b: Self) -> f64 {
-        let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let along = (self.x - a.x) * dx + (self.y - a.y) * dy;
-        let share = (along / (dx * dx + dy * dy)).clamp(0.0, 1.0);
-        // Of a segment without length, every point is the same.
-        self.distance(a.towards(b, if share.is_nan() { 0.0 } else { share }))
-    }
-
-    /// The point a fraction `t` of the way to `other`.
-    pub fn towards(self, other: Self, t: f64) -> Self {
-        let between = |from: f64, to: f64| from + t * (to - from);
-        point(between(self.x, other.x), between(self.y, other.y))
-    }
+/// Distance from a point to the segment from `a` to `b`.
+fn distance_to_segment(p: DVec2, [a, b]: [DVec2; 2]) -> f64 {
+    let along = b - a;
+    let share = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    // Of a segment without length, every point is the same.
+    let share = if share.is_nan() { 0.0 } else { share };
+    distance(p, a + share * along)
 }
 
 /// A regular polygon that passes for a disc at the sizes used for markers and joins.
-pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Point> {
+pub(crate) fn disc(centre: DVec2, radius: f64) -> Vec<DVec2> {
     let sides = if radius < 2.0 { 12 } else { 24 };
-    let corner = |k| {
-        let (sin, cos) = (TAU * f64::from(k) / f64::from(sides)).sin_cos();
-        point(centre.x + radius * cos, centre.y + radius * sin)
-    };
+    let angle = |k: i32| TAU * f64::from(k) / f64::from(sides);
+    let corner = |k| centre + radius * DVec2::from_angle(angle(k));
     (0..sides).map(corner).collect()
 }
 
@@ -73,8 +55,8 @@ impl Rect {
         self.y + self.height
     }
 
-    pub fn centre(&self) -> Point {
-        point(self.x + 0.5 * self.width, self.y + 0.5 * self.height)
+    pub fn centre(&self) -> DVec2 {
+        dvec2(self.x + 0.5 * self.width, self.y + 0.5 * self.height)
     }
 
     /// The box grown by `by` on every side.
@@ -83,7 +65,7 @@ impl Rect {
         Self::new(self.x - by, self.y - by, width, height)
     }
 
-    pub fn contains(&self, p: Point) -> bool {
+    pub fn contains(&self, p: DVec2) -> bool {
         p.x >= self.x && p.x <= self.right() && p.y >= self.y && p.y <= self.bottom()
     }
 
@@ -104,15 +86,9 @@ impl Rect {
     }
 
     /// Corners, clockwise from the upper left.
-    pub fn corners(&self) -> [Point; 4] {
-        let (right, bottom) = (self.right(), self.bottom());
-        [
-            (self.x, self.y),
-            (right, self.y),
-            (right, bottom),
-            (self.x, bottom),
-        ]
-        .map(|(x, y)| point(x, y))
+    pub fn corners(&self) -> [DVec2; 4] {
+        let (left, top, right, bottom) = (self.x, self.y, self.right(), self.bottom());
+        [[left, top], [right, top], [right, bottom], [left, bottom]].map(DVec2::from)
     }
 }
 
@@ -126,15 +102,6 @@ pub(crate) struct Margins {
 }
 
 impl Margins {
-    pub fn even(width: f64) -> Self {
-        Self {
-            left: width,
-            right: width,
-            top: width,
-            bottom: width,
-        }
-    }
-
     pub fn max(self, other: Self) -> Self {
         Self {
             left: self.left.max(other.left),
@@ -146,14 +113,14 @@ impl Margins {
 }
 
 /// The part of the segment from `a` to `b` inside `bounds` (Liang and Barsky, 1984).
-fn clip_segment(a: Point, b: Point, bounds: &Rect) -> Option<(Point, Point)> {
-    let (dx, dy) = (b.x - a.x, b.y - a.y);
+fn clip_segment(a: DVec2, b: DVec2, bounds: &Rect) -> Option<(DVec2, DVec2)> {
+    let along = b - a;
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     let sides = [
-        (-dx, a.x - bounds.x),
-        (dx, bounds.right() - a.x),
-        (-dy, a.y - bounds.y),
-        (dy, bounds.bottom() - a.y),
+        (-along.x, a.x - bounds.x),
+        (along.x, bounds.right() - a.x),
+        (-along.y, a.y - bounds.y),
+        (along.y, bounds.bottom() - a.y),
     ];
     for (slope, gap) in sides {
         if slope == 0.0 {
@@ -166,18 +133,18 @@ fn clip_segment(a: Point, b: Point, bounds: &Rect) -> Option<(Point, Point)> {
             leave = leave.min(gap / slope);
         }
     }
-    (enter <= leave).then(|| (a.towards(b, enter), a.towards(b, leave)))
+    (enter <= leave).then(|| (a + enter * along, a + leave * along))
 }
 
 /// Clips a polyline, giving the connected runs inside `bounds`.
-pub(crate) fn clip_polyline(points: &[Point], bounds: &Rect) -> Vec<Vec<Point>> {
-    let mut runs: Vec<Vec<Point>> = Vec::new();
+pub(crate) fn clip_polyline(points: &[DVec2], bounds: &Rect) -> Vec<Vec<DVec2>> {
+    let mut runs: Vec<Vec<DVec2>> = Vec::new();
     for pair in points.windows(2) {
         let Some((a, b)) = clip_segment(pair[0], pair[1], bounds) else {
             continue;
         };
         match runs.last_mut() {
-            Some(run) if run.last().is_some_and(|end| end.distance(a) < 1e-9) => run.push(b),
+            Some(run) if run.last().is_some_and(|end| distance(*end, a) < 1e-9) => run.push(b),
             _ => runs.push(vec![a, b]),
         }
     }
@@ -185,9 +152,9 @@ pub(crate) fn clip_polyline(points: &[Point], bounds: &Rect) -> Vec<Vec<Point>> 
 }
 
 /// Clips a filled loop against `bounds` (Sutherland and Hodgman, 1974).
-pub(crate) fn clip_loop(points: &[Point], bounds: &Rect) -> Vec<Point> {
+pub(crate) fn clip_loop(points: &[DVec2], bounds: &Rect) -> Vec<DVec2> {
     let mut ring = points.to_vec();
-    let inside: [&dyn Fn(Point) -> f64; 4] = [
+    let inside: [&dyn Fn(DVec2) -> f64; 4] = [
         &|p| p.x - bounds.x,
         &|p| bounds.right() - p.x,
         &|p| p.y - bounds.y,
@@ -199,7 +166,7 @@ pub(crate) fn clip_loop(points: &[Point], bounds: &Rect) -> Vec<Point> {
             let a = ring[(k + ring.len() - 1) % ring.len()];
             let (da, db) = (depth(a), depth(b));
             if (da < 0.0) != (db < 0.0) {
-                clipped.push(a.towards(b, da / (da - db)));
+                clipped.push(a + da / (da - db) * (b - a));
             }
             if db >= 0.0 {
                 clipped.push(b);
@@ -213,11 +180,11 @@ pub(crate) fn clip_loop(points: &[Point], bounds: &Rect) -> Vec<Point> {
 /// Drops points closer than `spacing` to the last one kept; the ends stay.
 ///
 /// A curve that wanders inside the spacing is invisible at the resolution drawn.
-pub(crate) fn thin(points: &[Point], spacing: f64) -> Vec<Point> {
-    let mut kept: Vec<Point> = Vec::with_capacity(points.len());
+pub(crate) fn thin(points: &[DVec2], spacing: f64) -> Vec<DVec2> {
+    let mut kept: Vec<DVec2> = Vec::with_capacity(points.len());
     for (k, &p) in points.iter().enumerate() {
         let last = k + 1 == points.len();
-        if last || kept.last().is_none_or(|q| q.distance(p) >= spacing) {
+        if last || kept.last().is_none_or(|q| distance(*q, p) >= spacing) {
             kept.push(p);
         }
     }
@@ -226,11 +193,12 @@ pub(crate) fn thin(points: &[Point], spacing: f64) -> Vec<Point> {
 
 /// Leaves out points as long as no other is farther than `tolerance` from the line between those kept (Ramer, 1972; Douglas and Peucker,
 /// 1973). The ends stay.
-pub(crate) fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
+pub(crate) fn simplified(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
     let last = points.len().saturating_sub(1);
     let (mut kept, mut spans) = (vec![0, last], vec![(0, last)]);
     while let Some((from, to)) = spans.pop() {
-        let inner = (from + 1..to).map(|k| (k, points[k].distance_to(points[from], points[to])));
+        let off = |k: usize| distance_to_segment(points[k], [points[from], points[to]]);
+        let inner = (from + 1..to).map(|k| (k, off(k)));
         let farthest = inner.max_by(|(_, a), (_, b)| a.total_cmp(b));
         if let Some((middle, distance)) = farthest
             && distance > tolerance
@@ -247,7 +215,7 @@ pub(crate) fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
 }
 
 /// Cuts a polyline into the dashes of `pattern` (lengths of pen down, pen up, ...); empty: solid.
-pub(crate) fn dash(points: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
+pub(crate) fn dash(points: &[DVec2], pattern: &[f64]) -> Vec<Vec<DVec2>> {
     if pattern.is_empty() || points.len() < 2 {
         return vec![points.to_vec()];
     }
@@ -256,26 +224,20 @@ pub(crate) fn dash(points: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
     let mut current = vec![points[0]];
     for pair in points.windows(2) {
         let (mut from, to) = (pair[0], pair[1]);
-        loop {
-            let length = from.distance(to);
-            let ends = length <= left || !length.is_finite();
-            if ends {
-                left -= length;
-                if slot % 2 == 0 {
-                    current.push(to);
-                }
-                break;
-            }
-            from = from.towards(to, left / length);
+        let mut length = distance(from, to);
+        while length > left && length.is_finite() {
+            from += left / length * (to - from);
+            current.push(from);
             if slot % 2 == 0 {
-                current.push(from);
-                dashes.push(std::mem::take(&mut current));
-            } else {
-                current = vec![from];
+                dashes.push(current);
             }
+            current = vec![from];
             slot = (slot + 1) % pattern.len();
             left = pattern[slot];
+            length = distance(from, to);
         }
+        left -= length;
+        current.push(to);
     }
     if slot % 2 == 0 && current.len() > 1 {
         dashes.push(current);
@@ -292,15 +254,10 @@ mod tests {
 
     #[test]
     fn clipping_keeps_the_part_inside() {
-        let (a, b) = clip_segment(point(-5.0, 5.0), point(15.0, 5.0), &UNIT).unwrap();
-        assert_eq!((a, b), (point(0.0, 5.0), point(10.0, 5.0)));
-        assert!(clip_segment(point(-5.0, 0.0), point(0.0, -5.1), &UNIT).is_none());
-        let zigzag = [
-            point(2.0, 2.0),
-            point(2.0, 20.0),
-            point(8.0, 20.0),
-            point(8.0, 2.0),
-        ];
+        let (a, b) = clip_segment(dvec2(-5.0, 5.0), dvec2(15.0, 5.0), &UNIT).unwrap();
+        assert_eq!((a, b), (dvec2(0.0, 5.0), dvec2(10.0, 5.0)));
+        assert!(clip_segment(dvec2(-5.0, 0.0), dvec2(0.0, -5.1), &UNIT).is_none());
+        let zigzag = [[2.0, 2.0], [2.0, 20.0], [8.0, 20.0], [8.0, 2.0]].map(DVec2::from);
         assert_eq!(clip_polyline(&zigzag, &UNIT).len(), 2);
     }
 
@@ -316,22 +273,20 @@ mod tests {
     #[test]
     fn simplified_curves_keep_their_corners_and_their_place() {
         let step = |k: u32| 10.0 * f64::from(k) / 100.0;
-        let up = (0..=100).map(|k| point(0.0, step(k)));
-        let corner: Vec<Point> = up.chain((1..=100).map(|k| point(step(k), 10.0))).collect();
-        let corners = [point(0.0, 0.0), point(0.0, 10.0), point(10.0, 10.0)];
+        let up = (0..=100).map(|k| dvec2(0.0, step(k)));
+        let corner: Vec<DVec2> = up.chain((1..=100).map(|k| dvec2(step(k), 10.0))).collect();
+        let corners = [dvec2(0.0, 0.0), dvec2(0.0, 10.0), dvec2(10.0, 10.0)];
         assert_eq!(simplified(&corner, 0.05), corners);
         for few in 0..3 {
             assert_eq!(simplified(&corner[..few], 0.05), corner[..few]);
         }
-        let circle = |k: u32| {
-            let (sin, cos) = (TAU * f64::from(k) / 3000.0).sin_cos();
-            point(100.0 * cos, 100.0 * sin)
-        };
-        let ring: Vec<Point> = (0..=3000).map(circle).collect();
+        let circle = |k: u32| 100.0 * DVec2::from_angle(TAU * f64::from(k) / 3000.0);
+        let ring: Vec<DVec2> = (0..=3000).map(circle).collect();
         let kept = simplified(&ring, 0.05);
         assert!((60..140).contains(&kept.len()), "{}", kept.len());
         for &p in &ring {
-            let distances = kept.windows(2).map(|pair| p.distance_to(pair[0], pair[1]));
+            let ends = kept.windows(2).map(|pair| [pair[0], pair[1]]);
+            let distances = ends.map(|ends| distance_to_segment(p, ends));
             assert!(distances.fold(f64::INFINITY, f64::min) <= 0.05);
         }
     }
@@ -339,10 +294,10 @@ mod tests {
     proptest! {
         #[test]
         fn dashes_cover_the_pattern_share(length in 50.0..400.0_f64, cuts in 1_usize..40) {
-            let line: Vec<Point> =
-                (0..=cuts).map(|k| point(length * k as f64 / cuts as f64, 0.0)).collect();
+            let line: Vec<DVec2> =
+                (0..=cuts).map(|k| dvec2(length * k as f64 / cuts as f64, 0.0)).collect();
             let inked: f64 =
-                dash(&line, &[6.0, 4.0]).iter().map(|d| d[0].distance(d[d.len() - 1])).sum();
+                dash(&line, &[6.0, 4.0]).iter().map(|d| distance(d[0], d[d.len() - 1])).sum();
             let periods = (length / 10.0).floor();
             let expected = 6.0 * periods + (length - 10.0 * periods).min(6.0);
             prop_assert!((inked - expected).abs() < 1e-9);

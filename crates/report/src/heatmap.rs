@@ -26,8 +26,7 @@ impl Heatmap {
     /// A heat map with its axes and its colour bar. Ranges of the axes are the outer edges of the cells, 0 to 1 if there is none; without
     /// a range the colours span the data.
     ///
-    /// Values are in grid order: `values[i * shape[1] + j]` belongs to the `i`-th position along the
-    /// horizontal axis and the `j`-th along the vertical one (row-major, last axis fastest, `y` up).
+    /// `values[i * shape[1] + j]` belongs to the `i`-th position along the horizontal axis and the `j`-th along the vertical one.
     /// Values that cannot be shown (NaN, or not positive on a logarithmic colour axis) are drawn grey.
     pub fn new(
         title: impl Into<String>,
@@ -45,7 +44,6 @@ impl Heatmap {
         }
     }
 
-    /// The heat map with the ends of its axes.
     pub(crate) fn checked(&self, fonts: Fonts) -> Result<Coloured<'_>> {
         Error::check_shape(&self.title, self.shape, self.values.len())?;
         let mut values = self.values.iter().copied().filter(|&v| self.bar.shows(v));
@@ -79,10 +77,6 @@ const BAR_GAP: f64 = 10.0;
 const BAR_WIDTH: f64 = 14.0;
 
 impl Drawable for Coloured<'_> {
-    fn texts(&self) -> [&str; 3] {
-        [&self.map.title, "", ""]
-    }
-
     fn aspect(&self) -> Option<f64> {
         Some(self.axes.window.aspect())
     }

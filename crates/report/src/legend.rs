@@ -1,8 +1,9 @@
 //! Legends: what the colours and line styles mean.
 
+use glam::{DVec2, dvec2};
+
 use crate::colour::{Colour, INK};
 use crate::font::{self, Align, TextStyle};
-use crate::geom::{Point, point};
 use crate::style::{LineStyle, Marker};
 use crate::surface::Surface;
 
@@ -31,22 +32,17 @@ impl LegendEntry {
     }
 
     /// Draws sample and label to the right of `at`.
-    fn draw(&self, surface: &mut dyn Surface, at: Point, em: f64) {
-        let colour = self.colour.rgb();
+    fn draw(&self, surface: &mut dyn Surface, at: DVec2, em: f64) {
+        let (colour, right) = (self.colour.rgb(), |by| at + dvec2(by, 0.0));
         if self.style != LineStyle::None {
-            let line = [at, point(at.x + SAMPLE_WIDTH, at.y)];
+            let line = [at, right(SAMPLE_WIDTH)];
             surface.dashed(&line, 2.0, colour, self.style.pattern());
         }
         if let Some(marker) = self.marker {
-            let middle = point(at.x + 0.5 * SAMPLE_WIDTH, at.y);
-            surface.markers(marker, &[middle], colour);
+            surface.markers(marker, &[right(0.5 * SAMPLE_WIDTH)], colour);
         }
-        let text = point(at.x + SAMPLE_WIDTH + SAMPLE_GAP, at.y);
-        surface.text(
-            &self.label,
-            text,
-            TextStyle::new(em, INK).aligned(Align::Left),
-        );
+        let style = TextStyle::new(em, INK).aligned(Align::Left);
+        surface.text(&self.label, right(SAMPLE_WIDTH + SAMPLE_GAP), style);
     }
 }
 
@@ -58,7 +54,7 @@ const PADDING: f64 = 5.0;
 /// A legend with every entry in its place, relative to the middle of its upper edge.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
-    entries: Vec<(Point, LegendEntry)>,
+    entries: Vec<(DVec2, LegendEntry)>,
     em: f64,
     pub width: f64,
     pub height: f64,
@@ -84,7 +80,7 @@ impl Block {
             for line in group.chunks(columns.max(1)) {
                 let mut x = -0.5 * whole;
                 for (entry, step) in line.iter().zip(&steps) {
-                    entries.push((point(x, y + 0.5 * row), entry.clone()));
+                    entries.push((dvec2(x, y + 0.5 * row), entry.clone()));
                     x += step;
                 }
                 y += row;
@@ -101,8 +97,8 @@ impl Block {
     }
 
     /// Draws with the middle of the upper edge at `top`.
-    pub fn draw(&self, surface: &mut dyn Surface, top: Point) {
-        let place = |p: &Point| point((top.x + p.x).round(), top.y + p.y);
+    pub fn draw(&self, surface: &mut dyn Surface, top: DVec2) {
+        let place = |p: &DVec2| dvec2((top.x + p.x).round(), top.y + p.y);
         for (at, entry) in &self.entries {
             entry.draw(surface, place(at), self.em);
         }

@@ -46,9 +46,6 @@ pub struct Manifest {
 impl Manifest {
     /// Starts the clock and looks up what the program can know by itself. Parameters are anything that serialises to a map, such as a
     /// struct; then come the tensor backend, its device and its number format, and the seed of all random numbers.
-    ///
-    /// # Errors
-    /// [`Error::Json`] if the parameters do not.
     pub fn start(
         experiment: &str,
         parameters: &impl Serialize,
@@ -89,9 +86,6 @@ impl Manifest {
     }
 
     /// Writes `manifest.json` with the wall time so far.
-    ///
-    /// # Errors
-    /// [`Error::File`].
     pub fn write(&mut self, folder: &OutputDir) -> Result<PathBuf> {
         self.wall_seconds = self.clock.elapsed().as_secs_f64();
         folder.write_json("manifest.json", self)
@@ -168,15 +162,11 @@ mod tests {
         assert_eq!(json["parameters"]["epsilon"], 0.02);
         assert_eq!(json["seed"], 7);
         assert_eq!(json["backend"], "flex");
-        assert!(json["rustc"].as_str().unwrap().starts_with("rustc 1."));
-        assert!(
-            json["target"]
-                .as_str()
-                .unwrap()
-                .contains(std::env::consts::ARCH)
-        );
+        let word = |key: &str| json[key].as_str().unwrap();
+        assert!(word("rustc").starts_with("rustc 1."));
+        assert!(word("target").contains(std::env::consts::ARCH));
         assert!(json["cpus"].as_u64().unwrap() >= 1);
-        let started = json["started"].as_str().unwrap();
+        let started = word("started");
         assert!(
             started.len() == 20 && started.starts_with("20"),
             "{started}"

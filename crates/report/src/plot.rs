@@ -1,10 +1,12 @@
 //! Line charts.
 
+use glam::DVec2;
+
 use crate::axes::Axes;
 use crate::axis::{Axis, Window};
 use crate::colour::Colour;
 use crate::error::{Error, Result};
-use crate::geom::{Margins, Point, Rect, clip_polyline, thin};
+use crate::geom::{Margins, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
 use crate::panel::Drawable;
 use crate::style::{Fonts, LineStyle, Marker};
@@ -122,7 +124,6 @@ impl LineChart {
         self.x.shows(x) && self.y.shows(y)
     }
 
-    /// The chart with the ends of its axes.
     pub(crate) fn checked(&self, fonts: Fonts) -> Result<Plot<'_>> {
         let points = self.series.iter().flat_map(|s| &s.points);
         let shown: Vec<[f64; 2]> = points.copied().filter(|&p| self.shows(p)).collect();
@@ -146,10 +147,6 @@ pub(crate) struct Plot<'a> {
 }
 
 impl Drawable for Plot<'_> {
-    fn texts(&self) -> [&str; 3] {
-        [&self.chart.title, "", &self.chart.note]
-    }
-
     fn legend(&self) -> Vec<Vec<LegendEntry>> {
         if let Some(groups) = &self.chart.entries {
             return groups.clone();
@@ -157,10 +154,6 @@ impl Drawable for Plot<'_> {
         let entries = self.chart.series.iter().map(|series| &series.entry);
         let named = entries.filter(|entry| !entry.label.is_empty());
         vec![named.cloned().collect()]
-    }
-
-    fn aspect(&self) -> Option<f64> {
-        None
     }
 
     fn margins(&self, width: f64, height: f64) -> Margins {
@@ -175,7 +168,7 @@ impl Drawable for Plot<'_> {
             let colour = entry.colour.rgb();
             let mut symbols = Vec::new();
             for run in series.points.split(|&p| !self.chart.shows(p)) {
-                let placed: Vec<Point> = run
+                let placed: Vec<DVec2> = run
                     .iter()
                     .map(|&p| self.axes.window.place(&plot, p))
                     .collect();

@@ -83,10 +83,6 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
 }
 
 impl Drawable for &Raster {
-    fn texts(&self) -> [&str; 3] {
-        ["", &self.caption, ""]
-    }
-
     fn aspect(&self) -> Option<f64> {
         Some(self.size[1] as f64 / self.size[0] as f64)
     }

@@ -1,11 +1,12 @@
 //! Plane curves, filled or outlined, at equal aspect: zero level sets as small multiples.
 
+use glam::DVec2;
 use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
 use crate::error::Result;
-use crate::geom::{Point, Rect, clip_loop, clip_polyline, thin};
+use crate::geom::{Rect, clip_loop, clip_polyline, thin};
 use crate::panel::Drawable;
 use crate::surface::Surface;
 
@@ -47,13 +48,6 @@ impl Curve {
         self.fill = Some(colour.into());
         self
     }
-
-    /// Finite points only.
-    fn finite(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
-        let finite = |p: &&[f64; 2]| p.iter().all(|c| c.is_finite());
-        let rings = self.loops.iter();
-        rings.map(move |ring| ring.iter().filter(finite).copied().collect())
-    }
 }
 
 /// A panel of plane curves seen through a window, later ones on top, with a caption above.
@@ -81,7 +75,6 @@ impl Shapes {
         self
     }
 
-    /// The curves with the window they are seen through.
     pub(crate) fn checked(&self) -> Result<Seen<'_>> {
         Ok(Seen {
             shapes: self,
@@ -97,22 +90,18 @@ pub(crate) struct Seen<'a> {
 }
 
 impl Drawable for Seen<'_> {
-    fn texts(&self) -> [&str; 3] {
-        [&self.shapes.caption, "", ""]
-    }
-
     fn aspect(&self) -> Option<f64> {
         Some(self.window.aspect())
     }
 
     fn draw(&self, surface: &mut dyn Surface, plot: Rect) {
         for curve in &self.shapes.curves {
-            let place = |ring: Vec<[f64; 2]>| -> Vec<Point> {
-                let placed: Vec<Point> =
-                    ring.iter().map(|&p| self.window.place(&plot, p)).collect();
+            let place = |ring: &Vec<[f64; 2]>| -> Vec<DVec2> {
+                let finite = ring.iter().filter(|p| p.iter().all(|c| c.is_finite()));
+                let placed: Vec<DVec2> = finite.map(|&p| self.window.place(&plot, p)).collect();
                 thin(&placed, 0.2)
             };
-            let placed: Vec<Vec<Point>> = curve.finite().map(place).collect();
+            let placed: Vec<Vec<DVec2>> = curve.loops.iter().map(place).collect();
             if let Some(fill) = curve.fill {
                 let inside: Vec<_> = placed.iter().map(|ring| clip_loop(ring, &plot)).collect();
                 surface.fill(&inside, fill.rgb());

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::table::{Cell, Column, Format, Table};
 
 /// Numbers by the names of their metrics; what is not known is absent.
@@ -131,12 +131,18 @@ impl<'a, R> Sheet<'a, R> {
         self.columns(columns, of)
     }
 
-    /// The table, and the metrics with their names.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`](crate::Error::NotFinite), naming column and row.
+    /// The table, whose numbers must be finite, and the metrics with their names.
     pub fn finish(self) -> Result<(Table, Vec<(String, Cell)>)> {
-        self.table.check()?;
+        for (k, row) in self.table.rows.iter().enumerate() {
+            for (cell, column) in row.iter().zip(&self.table.columns) {
+                if let Cell::Number(value) = *cell
+                    && !value.is_finite()
+                {
+                    let what = format!("column {:?} of table row {k}", column.name);
+                    return Err(Error::NotFinite { what, value });
+                }
+            }
+        }
         Ok((self.table, self.metrics))
     }
 }

@@ -1,20 +1,18 @@
 //! What lines, markers and letters look like.
 
-use crate::geom::{Point, disc, point};
+use glam::{DVec2, dvec2};
+
+use crate::geom::disc;
 
 /// How a curve is stroked.
+#[allow(missing_docs, reason = "names say it")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineStyle {
-    /// Unbroken.
     #[default]
     Solid,
-    /// Long dashes.
     Dashed,
-    /// Short dashes.
     ShortDashed,
-    /// Dots.
     Dotted,
-    /// Dashes, each followed by two dots.
     DashDotDot,
     /// No line: only the markers are drawn.
     None,
@@ -34,15 +32,12 @@ impl LineStyle {
 }
 
 /// The symbol at a data point.
+#[allow(missing_docs, reason = "names say it")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marker {
-    /// A disc.
     Circle,
-    /// An axis-parallel square.
     Square,
-    /// A square on its corner.
     Diamond,
-    /// A triangle pointing up.
     Triangle,
 }
 
@@ -53,14 +48,14 @@ impl Marker {
     pub(crate) const RIM: f64 = 1.0;
 
     /// The corners of a marker of any radius.
-    pub(crate) fn outline(self, centre: Point, radius: f64) -> Vec<Point> {
+    pub(crate) fn outline(self, centre: DVec2, radius: f64) -> Vec<DVec2> {
         let corners: &[(f64, f64)] = match self {
             Self::Circle => return disc(centre, radius),
             Self::Square => &[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)],
             Self::Diamond => &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)],
             Self::Triangle => &[(0.0, -1.15), (1.1, 0.8), (-1.1, 0.8)],
         };
-        let place = |&(x, y)| point(centre.x + radius * x, centre.y + radius * y);
+        let place = |&(x, y)| centre + radius * dvec2(x, y);
         corners.iter().map(place).collect()
     }
 }
@@ -68,15 +63,16 @@ impl Marker {
 /// Letter sizes (em, in layout units) of one figure.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fonts {
-    pub heading: f64,
     pub title: f64,
     pub label: f64,
+    /// Of the numbers at axes, and of legends.
     pub tick: f64,
-    pub legend: f64,
-    pub note: f64,
 }
 
 impl Fonts {
+    pub const HEADING: f64 = 17.5;
+    pub const NOTE: f64 = 12.0;
+
     /// Sizes for a figure with this many panels side by side.
     pub fn for_columns(columns: usize) -> Self {
         let (title, label, tick) = match columns {
@@ -84,13 +80,6 @@ impl Fonts {
             2 => (15.0, 13.5, 12.5),
             _ => (14.0, 13.0, 12.0),
         };
-        Self {
-            heading: 17.5,
-            title,
-            label,
-            tick,
-            legend: tick,
-            note: 12.0,
-        }
+        Self { title, label, tick }
     }
 }

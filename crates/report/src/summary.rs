@@ -15,15 +15,6 @@ use crate::table::Cell;
 /// Names are lower-case words of ASCII letters, digits and `_` (not at their start), the first one starting with a letter, joined by
 /// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats have the fewest digits that read
 /// back exactly.
-///
-/// ```
-/// let mut summary = report::Summary::new();
-/// summary.insert("circle.error_l2", 2.5e-4)?;
-/// summary.insert("circle.newton_iterations", 17_usize)?;
-/// let json = serde_json::to_string(&summary).expect("the keys are text");
-/// assert_eq!(json, r#"{"circle.error_l2":0.00025,"circle.newton_iterations":17}"#);
-/// # Ok::<(), report::Error>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(transparent)]
 pub struct Summary {
@@ -31,15 +22,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// An empty summary.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds a metric: an integer without a decimal point, and nothing for text or a missing value.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`], [`Error::MetricName`], or [`Error::DuplicateMetric`].
     pub fn insert(&mut self, name: &str, value: impl Into<Cell>) -> Result<()> {
         let number = match value.into() {
             Cell::Integer(value) => value.into(),
@@ -52,11 +35,8 @@ impl Summary {
         self.add(name, number)
     }
 
-    /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`] for a field that is NaN, infinite or missing; [`Error::Json`] for what is no record; as
-    /// [`Summary::insert`].
+    /// Adds the numbers of a record as `<prefix>.<field>`. Fields that hold text, lists or records are left out; those that are NaN,
+    /// infinite or missing are refused.
     pub fn insert_record(&mut self, prefix: &str, record: &impl Serialize) -> Result<()> {
         let fields: Map<String, Value> = serde_json::to_value(record)
             .and_then(serde_json::from_value)
@@ -86,9 +66,6 @@ impl Summary {
     }
 
     /// Writes `summary.json`.
-    ///
-    /// # Errors
-    /// [`Error::File`].
     pub fn write(&self, folder: &OutputDir) -> Result<PathBuf> {
         folder.write_json("summary.json", self)
     }
@@ -109,13 +86,13 @@ mod tests {
 
     #[test]
     fn values_that_are_not_finite_are_refused_by_name() {
-        let mut summary = Summary::new();
+        let mut summary = Summary::default();
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let error = summary.insert("torus.energy", value).unwrap_err();
             assert!(matches!(error, Error::NotFinite { .. }));
             assert!(error.to_string().contains("\"torus.energy\""), "{error}");
         }
-        assert_eq!(summary, Summary::new());
+        assert_eq!(summary, Summary::default());
     }
 
     #[test]
@@ -131,7 +108,7 @@ mod tests {
             radius,
             steps: 17,
         };
-        let mut summary = Summary::new();
+        let mut summary = Summary::default();
         summary.insert_record("circle", &circle(0.5)).unwrap();
         let expected = json!({"circle.radius": 0.5, "circle.steps": 17});
         assert_eq!(json!(summary), expected);
@@ -139,15 +116,13 @@ mod tests {
             .insert_record("other", &circle(f64::NAN))
             .unwrap_err();
         assert!(error.to_string().contains("\"other.radius\""), "{error}");
-        assert!(matches!(
-            summary.insert_record("no", &[1, 2]).unwrap_err(),
-            Error::Json { .. }
-        ));
+        let error = summary.insert_record("no", &[1, 2]).unwrap_err();
+        assert!(matches!(error, Error::Json { .. }));
     }
 
     #[test]
     fn names_follow_the_grammar() {
-        let mut summary = Summary::new();
+        let mut summary = Summary::default();
         for name in [
             "a",
             "error_l2",
@@ -173,7 +148,7 @@ mod tests {
         fn every_finite_number_survives(
             value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO,
         ) {
-            let mut summary = Summary::new();
+            let mut summary = Summary::default();
             summary.insert("metric", value).unwrap();
             let text = serde_json::to_string_pretty(&summary).unwrap();
             let read: BTreeMap<String, f64> = serde_json::from_str(&text).unwrap();

@@ -2,10 +2,11 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use glam::DVec2;
 use srgb::Rgb;
 
 use crate::font::{Align, HALF_CAPITAL, TextStyle};
-use crate::geom::{Point, Rect, point, simplified};
+use crate::geom::{Rect, simplified};
 use crate::style::Marker;
 use crate::surface::Surface;
 
@@ -28,7 +29,7 @@ fn hex(Rgb(r, g, b): Rgb) -> String {
 }
 
 /// Path data: the first point, and the steps from each to the next.
-fn path(points: &[Point]) -> String {
+fn path(points: &[DVec2]) -> String {
     let points = simplified(points, TOLERANCE);
     let mut places: Vec<_> = points.iter().map(|p| (units(p.x), units(p.y))).collect();
     places.dedup();
@@ -56,7 +57,7 @@ struct SvgSurface {
 }
 
 impl Surface for SvgSurface {
-    fn dashed(&mut self, points: &[Point], width: f64, colour: Rgb, pattern: &[f64]) {
+    fn dashed(&mut self, points: &[DVec2], width: f64, colour: Rgb, pattern: &[f64]) {
         let (data, colour, width) = (path(points), hex(colour), units(width));
         let lengths: Vec<String> = pattern.iter().map(|&l| units(l).to_string()).collect();
         let dashes = match lengths.join(" ") {
@@ -68,17 +69,17 @@ impl Surface for SvgSurface {
         ));
     }
 
-    fn fill(&mut self, loops: &[Vec<Point>], colour: Rgb) {
+    fn fill(&mut self, loops: &[Vec<DVec2>], colour: Rgb) {
         let loops = loops.iter().filter(|points| !points.is_empty());
         let data: String = loops.map(|points| path(points) + "z").collect();
         self.shapes
             .push(format!("<path d=\"{data}\" fill=\"{}\"/>\n", hex(colour)));
     }
 
-    fn markers(&mut self, marker: Marker, places: &[Point], colour: Rgb) {
+    fn markers(&mut self, marker: Marker, places: &[DVec2], colour: Rgb) {
         // The rim is a line around the marker: its middle is half its width outside.
         let radius = Marker::RADIUS + 0.5 * Marker::RIM;
-        let symbol = |&at: &Point| match marker {
+        let symbol = |&at: &DVec2| match marker {
             Marker::Circle => {
                 let (x, y, r) = (units(at.x), units(at.y), units(radius));
                 format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\"/>\n")
@@ -92,13 +93,8 @@ impl Surface for SvgSurface {
         ));
     }
 
-    fn text(&mut self, line: &str, at: Point, style: TextStyle) {
-        let drop = HALF_CAPITAL * style.em;
-        let base = if style.vertical {
-            point(at.x + drop, at.y)
-        } else {
-            point(at.x, at.y + drop)
-        };
+    fn text(&mut self, line: &str, at: DVec2, style: TextStyle) {
+        let base = style.below(at, HALF_CAPITAL);
         let (x, y) = (units(base.x), units(base.y));
         let turned = if style.vertical {
             format!(" transform=\"rotate(-90 {x} {y})\"")
@@ -147,6 +143,8 @@ pub(crate) fn svg((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surfac
 
 #[cfg(test)]
 mod tests {
+    use glam::dvec2;
+
     use super::*;
 
     const BLACK: Rgb = Rgb::BLACK;
@@ -156,7 +154,7 @@ mod tests {
         let ring = |side| Rect::new(5.0, 5.0, side, side).corners().to_vec();
         let document = svg((100, 50), |s| {
             s.fill(&[ring(20.0), vec![], ring(10.0)], BLACK);
-            s.dashed(&[point(0.0, 1.0), point(9.0, 1.0)], 2.0, BLACK, &[8.5, 4.5]);
+            s.dashed(&[dvec2(0.0, 1.0), dvec2(9.0, 1.0)], 2.0, BLACK, &[8.5, 4.5]);
         });
         let path = "M80 80l320 0 0 320-320 0zM80 80l160 0 0 160-160 0z";
         assert!(
@@ -171,7 +169,7 @@ mod tests {
     fn images_take_their_place_and_scale_below_everything_else() {
         let cells = [Rgb(1, 2, 3), Rgb(4, 5, 6)];
         let document = svg((100, 50), |s| {
-            s.markers(Marker::Circle, &[point(1.0, 2.0)], BLACK);
+            s.markers(Marker::Circle, &[dvec2(1.0, 2.0)], BLACK);
             s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells, false);
         });
         assert!(document.contains("width=\"100\" height=\"50\" viewBox=\"0 0 1600 800\""));

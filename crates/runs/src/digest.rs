@@ -9,21 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// The SHA-256 of some bytes in lower-case hexadecimal digits, for example as the fingerprint of the
-/// options of a run.
-pub fn fingerprint(bytes: impl AsRef<[u8]>) -> String {
-    fingerprint_of_parts([bytes])
-}
-
-/// That of bytes of which not all are in memory.
-pub fn fingerprint_of_parts<B: AsRef<[u8]>>(parts: impl IntoIterator<Item = B>) -> String {
-    let mut hash = Sha256::default();
-    for bytes in parts {
-        hash.update(bytes);
-    }
-    hexadecimal(hash.finish())
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Seal {

@@ -26,7 +26,6 @@ pub struct RunDirectory {
     pub(crate) _lock: Lock,
 }
 
-#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl RunDirectory {
     /// Starts a run in a folder that does not exist or is empty: writes `files`, names and texts such
     /// as that of `config.toml`, and then the first checkpoint.

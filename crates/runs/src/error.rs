@@ -21,7 +21,6 @@ pub enum Error {
     NoRun(PathBuf),
     #[error("another process works on the run in {}: wait for it or stop it", .0.display())]
     Locked(PathBuf),
-    /// A file is not what was committed.
     #[error("{} is damaged: {what}; {}", path.display(), advice(*.fallback))]
     Damaged {
         path: PathBuf,

@@ -21,9 +21,6 @@ impl Interrupt {
     pub const EXIT_CODE: u8 = 130;
 
     /// Starts to catch the signals.
-    ///
-    /// # Errors
-    /// [`Error::Signals`] if the system does not let it.
     pub fn catch() -> Result<Self, Error> {
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {

@@ -58,6 +58,8 @@
 //!   most [`State::MAX_NOTES`]), forty times `timings.json`, and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
+
 mod checkpoint;
 mod digest;
 mod directory;
@@ -70,7 +72,6 @@ mod stored;
 mod timings;
 
 pub use checkpoint::State;
-pub use digest::{fingerprint, fingerprint_of_parts};
 pub use directory::RunDirectory;
 pub use error::Error;
 pub use interrupt::Interrupt;

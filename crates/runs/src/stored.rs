@@ -20,7 +20,6 @@ pub struct StoredRun {
     leftovers: Vec<PathBuf>,
 }
 
-#[expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 impl RunDirectory {
     /// Opens a run and checks every file of it; nothing is changed.
     ///
@@ -40,10 +39,6 @@ impl RunDirectory {
     }
 }
 
-#[expect(
-    clippy::missing_errors_doc,
-    reason = "said where runs are opened; all others give Error::Io alone"
-)]
 impl StoredRun {
     /// [`RunDirectory::open`], or [`RunDirectory::recover`], on another storage than the disk itself.
     pub fn find_on(

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use files::{Sha256, hexadecimal};
 use serde::{Deserialize, Serialize};
 
-use crate::digest::{self, fingerprint};
-use crate::{Error, names};
+use crate::{Error, digest, names};
 
 #[derive(Deserialize)]
 struct Sealed {
@@ -34,7 +34,7 @@ pub(crate) fn read(folder: &Path) -> Result<Vec<f64>, Error> {
 fn seal(seconds: &[f64]) -> String {
     let content = serde_json::to_string_pretty(&Content { seconds });
     let content = content.expect("it is numbers").replace('\n', "\n  ");
-    let sha256 = fingerprint(&content);
+    let sha256 = hexadecimal(Sha256::of(&content));
     format!("{{\n  \"sha256\": \"{sha256}\",\n  \"content\": {content}\n}}\n")
 }
 

@@ -1,20 +1,18 @@
 //! Every single operation on the disk fails once, or with all after it, and the run ends with the
 //! same bytes nevertheless.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use crate::toy::{
     self, FILES, Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents,
 };
 use files::{Disk, Storage};
-use runs::{Error, Interrupt, RunDirectory, StoredRun};
+use runs::{Error, RunDirectory, StoredRun};
 
 /// Fails at operation `at`, and also at all later ones if the process is to count as dead.
 #[derive(Debug)]
@@ -92,18 +90,11 @@ fn survives(
     expected: &BTreeMap<String, Vec<u8>>,
     damaged: bool,
 ) -> bool {
-    let committed = Cell::new(None);
-    let result = toy::run(
-        folder,
-        &Toy {
-            storage: storage.clone(),
-            interrupt: &Interrupt::never(),
-            pause: Duration::ZERO,
-            stop: STEPS,
-            recover: damaged,
-            committed: &committed,
-        },
-    );
+    let toy = Toy {
+        recover: damaged,
+        ..Toy::on(storage.clone())
+    };
+    let result = toy::run(folder, &toy);
     let fault = storage.operations() > storage.at;
     assert_eq!(result.is_err(), fault, "{result:?}");
     if let Err(error) = &result {
@@ -113,11 +104,11 @@ fn survives(
             Ok(stored) => {
                 let step = stored.state().step;
                 // The commit that failed may have failed after it was done.
-                let last = committed.get().unwrap_or(0);
+                let last = toy.committed.get().unwrap_or(0);
                 assert!(step == last || step == last + 3, "{step} after {last}");
                 assert_eq!(*stored.state(), state_at(step));
             }
-            Err(Error::NoRun(_)) => assert_eq!(committed.get(), None, "{message}"),
+            Err(Error::NoRun(_)) => assert_eq!(toy.committed.get(), None, "{message}"),
             Err(Error::Damaged { .. }) if damaged => {}
             Err(other) => panic!("{other} after {message}"),
         }
@@ -174,14 +165,7 @@ fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>, least: us
     for killed_at in kills {
         let folder = toy::quick_folder();
         let left = folder.path().join("left");
-        let toy = Toy {
-            storage: Faulty::new(killed_at, true, 700),
-            interrupt: &Interrupt::never(),
-            pause: Duration::ZERO,
-            stop: STEPS,
-            recover: false,
-            committed: &Cell::new(None),
-        };
+        let toy = Toy::on(Faulty::new(killed_at, true, 700));
         toy::run(&left, &toy).unwrap_err();
         leftovers += RunDirectory::open(&left).unwrap().leftovers().count();
         let left = toy::all_contents(&left);
@@ -353,14 +337,7 @@ impl Storage for Watching {
 fn a_power_failure_finds_what_the_checkpoint_lists() {
     let folder = toy::quick_folder();
     let storage = Arc::new(Watching::default());
-    let toy = Toy {
-        storage: storage.clone(),
-        interrupt: &Interrupt::never(),
-        pause: Duration::ZERO,
-        stop: STEPS,
-        recover: false,
-        committed: &Cell::new(None),
-    };
+    let toy = Toy::on(storage.clone());
     toy::run(&folder.path().join("run"), &toy).unwrap();
     let watched = storage.0.lock().unwrap();
     // One at the start, twenty commits, one at the end in place of the last. Only that stays.

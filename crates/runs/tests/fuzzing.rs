@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use ::fuzzing::{Fuzz, Limit, peak_of};
-use runs::{Error, RunDirectory, State, StoredRun, fingerprint};
+use files::{Sha256, hexadecimal};
+use runs::{Error, RunDirectory, State, StoredRun};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -180,7 +181,7 @@ fn fuzzing_changed_timings_are_refused() {
         let middle = "\",\n  \"content\": ".len();
         if bytes.len() >= at + 64 + middle + 3 {
             let content = &bytes[at + 64 + middle..bytes.len() - 3];
-            let checksum = fingerprint(content);
+            let checksum = hexadecimal(Sha256::of(content));
             bytes[at..at + 64].copy_from_slice(checksum.as_bytes());
         }
         bytes

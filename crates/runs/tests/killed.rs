@@ -1,6 +1,5 @@
 //! The toy as a process of its own: killed, interrupted, and out of space.
 
-use std::cell::Cell;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -25,17 +24,12 @@ fn process() {
     let interrupt = Interrupt::catch().unwrap();
     // Now signals are caught.
     std::fs::write(folder.with_extension("ready"), "").unwrap();
-    let result = toy::run(
-        &folder,
-        &Toy {
-            storage: Arc::new(Disk),
-            interrupt: &interrupt,
-            pause: Duration::from_millis(pause),
-            stop: STEPS,
-            recover: false,
-            committed: &Cell::new(None),
-        },
-    );
+    let toy = Toy {
+        interrupt: interrupt.clone(),
+        pause: Duration::from_millis(pause),
+        ..Toy::on(Arc::new(Disk))
+    };
+    let result = toy::run(&folder, &toy);
     std::process::exit(match result {
         Ok(()) if interrupt.requested() => Interrupt::EXIT_CODE.into(),
         Ok(()) => 0,

@@ -81,9 +81,9 @@ pub fn state_at(step_number: u64) -> State<'static> {
 }
 
 /// How to run the toy.
-pub struct Toy<'a> {
+pub struct Toy {
     pub storage: Arc<dyn Storage>,
-    pub interrupt: &'a Interrupt,
+    pub interrupt: Interrupt,
     /// Time that a step takes.
     pub pause: Duration,
     /// Go no further, and commit no more.
@@ -91,7 +91,21 @@ pub struct Toy<'a> {
     /// Recover from damage.
     pub recover: bool,
     /// The last step that was committed for certain, once the run is there.
-    pub committed: &'a Cell<Option<u64>>,
+    pub committed: Cell<Option<u64>>,
+}
+
+impl Toy {
+    /// To the end, as fast as possible.
+    pub fn on(storage: Arc<dyn Storage>) -> Self {
+        Self {
+            storage,
+            interrupt: Interrupt::never(),
+            pause: Duration::ZERO,
+            stop: STEPS,
+            recover: false,
+            committed: Cell::new(None),
+        }
+    }
 }
 
 /// Starts or resumes the toy, commits every 3 steps and writes a field every 10.
@@ -154,12 +168,9 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
 /// The toy up to a step on a disk without waiting, repairing what is damaged.
 pub fn run_to(folder: &Path, stop: u64) -> Result<(), Error> {
     let toy = Toy {
-        storage: Arc::new(Quick),
-        interrupt: &Interrupt::never(),
-        pause: Duration::ZERO,
         stop,
         recover: true,
-        committed: &Cell::new(None),
+        ..Toy::on(Arc::new(Quick))
     };
     run(folder, &toy)
 }

@@ -91,9 +91,6 @@ impl Volume {
     /// between the centres of the voxels whose difference put it there. (S. F. F. Gibson: Constrained elastic surface nets. MICCAI 1998.)
     /// A body of few voxels across becomes thinner by up to a voxel where others are thick. Parts and holes inside whose surface there are
     /// fewer than eight voxels are taken for noise and left out, if there are larger ones: their voxels do not count.
-    ///
-    /// # Errors
-    /// [`Error::NothingInside`], [`Error::Surfaces`].
     pub fn body(&self, inside: Inside) -> Result<Body, Error> {
         let part = Part::of(self, inside)?;
         let (lattice, _) = ClosedMesh::new(part.surface(self, inside)?)?;

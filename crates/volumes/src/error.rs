@@ -19,7 +19,6 @@ pub enum Error {
     NothingInside { what: String, low: f64, high: f64 },
     #[error("{path} must end in .nii or .nii.gz: volumes are written as NIfTI", path = path.display())]
     UnknownFormat { path: PathBuf },
-    /// Of the surface.
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
 }

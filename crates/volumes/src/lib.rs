@@ -44,6 +44,9 @@
 //!   surfaces are there, in the units of the file.
 //! - Faces are counter-clockwise seen from outside, also where the axes of the voxels are left-handed.
 //! - Same input, same bytes, for any number of threads.
+//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+
+#![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
 mod body;
 mod error;

@@ -32,10 +32,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 ///   in millimetres where that is per inch or centimetre, and pages the distance that ImageJ notes, or else that of rows.
 ///
 /// Memory: four times the bytes of the voxels, of which there may be as many as the file has, or 2^31 if it has fewer, and 1 GiB.
-///
-/// # Errors
-/// [`Error::Io`]; [`Error::Format`] for everything that is wrong with the contents: truncated or overlong files, headers that are
-/// none, absurd sizes, values that are not finite.
+/// Truncated and overlong files are refused, and values that are not finite.
 pub fn read(path: impl AsRef<Path>) -> Result<Volume, Error> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
@@ -46,9 +43,6 @@ pub fn read(path: impl AsRef<Path>) -> Result<Volume, Error> {
 }
 
 /// The volume in the bytes of a file; see [`read`].
-///
-/// # Errors
-/// Whatever is wrong with them, in one line.
 pub fn decode(bytes: &[u8]) -> Result<Volume, FormatError> {
     let limit = MOST_BYTES.max(bytes.len() as u64);
     if stack::is_tiff(bytes) {
@@ -106,7 +100,19 @@ struct Fields<'a> {
     big_endian: bool,
 }
 
-impl Fields<'_> {
+impl<'a> Fields<'a> {
+    /// Of a header of that many bytes.
+    fn new(bytes: &'a [u8], length: usize, big_endian: bool) -> Result<Self, FormatError> {
+        if bytes.len() < length {
+            return Err(FormatError::Length {
+                expected: length as u64,
+                found: bytes.len() as u64,
+                longer: false,
+            });
+        }
+        Ok(Self { bytes, big_endian })
+    }
+
     fn number(&self, at: usize, number: Number) -> f64 {
         number.decode(&self.bytes[at..at + number.size()], self.big_endian)
     }

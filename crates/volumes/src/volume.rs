@@ -37,11 +37,8 @@ impl Voxels {
 }
 
 impl Volume {
-    /// Labels in a row, the first axis fastest, of voxels with these sides from the centre of the first one.
-    ///
-    /// # Errors
-    /// [`Error::Volume`] unless there are two voxels along each axis at least, as many labels as voxels, and sides that are finite and
-    /// positive.
+    /// Labels in a row, the first axis fastest, of voxels with these sides, finite and positive, from the centre of the first one. There
+    /// are two voxels along each axis at least.
     pub fn of_labels(
         size: [usize; 3],
         origin: [f64; 3],

@@ -12,10 +12,8 @@ use crate::{Error, Volume};
 const HEADER: usize = 348;
 const START: usize = 352;
 
-/// Writes labels of 0 to 255 as NIfTI-1, atomically; a name that ends in `.gz` compresses them. Other values go to the nearest label.
-///
-/// # Errors
-/// [`Error::UnknownFormat`] for a name that ends in neither `.nii` nor `.nii.gz`, [`Error::Io`].
+/// Writes labels of 0 to 255 as NIfTI-1, atomically, to a name that ends in `.nii`, or compressed in `.nii.gz`. Other values go to the
+/// nearest label.
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
     let path = path.as_ref();
     let ends = |path: &Path, with: &str| {

@@ -9,7 +9,8 @@ use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{FormatError, Tones, checked};
+use super::{Tones, checked};
+use crate::FormatError;
 
 /// Progressive files have some ten scans; each takes time for the whole image.
 const MOST_SCANS: usize = 64;

@@ -1,5 +1,9 @@
 //! Image files of all kinds.
 
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use images::Image;
 use png::{BitDepth, ColorType};
 
@@ -212,37 +216,38 @@ pub fn chunk(bytes: &mut Vec<u8>, name: [u8; 4], data: &[u8]) {
     let start = bytes.len();
     bytes.extend(name);
     bytes.extend(data);
-    let mut sum = u32::MAX;
-    for &byte in &bytes[start..] {
-        sum ^= u32::from(byte);
-        for _ in 0..8 {
-            sum = if sum & 1 == 1 {
-                sum >> 1 ^ 0xedb8_8320
-            } else {
-                sum >> 1
-            };
-        }
+    let mut sum = flate2::Crc::new();
+    sum.update(&bytes[start..]);
+    bytes.extend(sum.sum().to_be_bytes());
+}
+
+/// A PNG file of grey pixels of 8 bits, with chunks before its data, which are rows with a byte for their filter.
+pub fn png_of_chunks(
+    size: [u32; 2],
+    interlaced: u8,
+    more: &[([u8; 4], &[u8])],
+    rows: &[u8],
+) -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+    let size = size.map(u32::to_be_bytes).concat();
+    chunk(
+        &mut bytes,
+        *b"IHDR",
+        &[&size[..], &[8, 0, 0, 0, interlaced]].concat(),
+    );
+    for (name, data) in more {
+        chunk(&mut bytes, *name, data);
     }
-    bytes.extend((!sum).to_be_bytes());
+    chunk(&mut bytes, *b"IDAT", &zlib(rows));
+    chunk(&mut bytes, *b"IEND", &[]);
+    bytes
 }
 
 /// A zlib stream without compression.
-pub fn zlib(data: &[u8]) -> Vec<u8> {
-    let length = data.len() as u16;
-    let (mut a, mut b) = (1_u32, 0_u32);
-    for &byte in data {
-        a = (a + u32::from(byte)) % 65521;
-        b = (b + a) % 65521;
-    }
-    let sum = b << 16 | a;
-    [
-        &[0x78, 0x01, 1][..],
-        &length.to_le_bytes(),
-        &(!length).to_le_bytes(),
-        data,
-        &sum.to_be_bytes(),
-    ]
-    .concat()
+fn zlib(data: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::none());
+    encoder.write_all(data).unwrap();
+    encoder.finish().unwrap()
 }
 
 /// Exif data that tells the orientation.

@@ -1,7 +1,7 @@
 //! Shapes rendered to files without the code under test.
 pub mod files;
 
-use images::{Image, decode};
+use images::{Image, Outline, Side, decode};
 
 /// Grey values from 0 to 1, row by row from the top.
 pub struct Raster {
@@ -107,6 +107,12 @@ pub fn jpeg(
         .encode(data, size[0] as u16, size[1] as u16, colour)
         .unwrap();
     bytes
+}
+
+/// The outline with a threshold in the middle.
+pub fn outline(image: &Image) -> Outline {
+    let side = Side::of(image, 0.5).unwrap();
+    Outline::of_image(image, side).unwrap()
 }
 
 #[track_caller]

@@ -17,18 +17,10 @@ pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
     if head.get(208..212)? != b"MAP " {
         return None;
     }
-    if head.len() < HEAD {
-        return Some(Err(FormatError::Length {
-            expected: HEAD as u64,
-            found: head.len() as u64,
-            longer: false,
-        }));
-    }
-    Some(entries(&Fields {
-        bytes: head,
-        // The stamp of the machine; some programs write none, and all machines of theirs are little-endian.
-        big_endian: head[212] == 0x11,
-    }))
+    // The stamp of the machine; some programs write none, and all machines of theirs are little-endian.
+    let big_endian = head.get(212) == Some(&0x11);
+    let fields = Fields::new(head, HEAD, big_endian);
+    Some(fields.and_then(|fields| entries(&fields)))
 }
 
 fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {

@@ -19,18 +19,8 @@ pub(super) fn header(head: &[u8]) -> Option<Result<Header, FormatError>> {
         (i32::from_be_bytes(first), true),
     ];
     let (length, big_endian) = orders.into_iter().find(|(n, _)| LENGTHS.contains(n))?;
-    if head.len() < length as usize {
-        return Some(Err(FormatError::Length {
-            expected: length as u64,
-            found: head.len() as u64,
-            longer: false,
-        }));
-    }
-    let fields = Fields {
-        bytes: head,
-        big_endian,
-    };
-    Some(entries(&fields, length == LENGTHS[0]))
+    let fields = Fields::new(head, length as usize, big_endian);
+    Some(fields.and_then(|fields| entries(&fields, length == LENGTHS[0])))
 }
 
 fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
