@@ -168,7 +168,7 @@ pub fn folder() -> PathBuf {
 }
 
 fn about_file(path: &Path) -> Result<(String, Value)> {
-    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
+    let bytes = files::read(path)?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     let name = name.to_string_lossy().into_owned();
     let about = json!({ "file": name, "sha256": hexadecimal(Sha256::of(bytes)) });

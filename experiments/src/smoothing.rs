@@ -37,10 +37,6 @@ pub fn mesh_raster(
     (up, frame): (UpAxis, BoundingBox<3>),
     caption: impl Into<String>,
 ) -> Result<Raster> {
-    let scene = Scene::of_mesh(mesh.clone()).within(frame).view(View {
-        up,
-        azimuth: -60.0,
-        elevation: 25.0,
-    });
+    let scene = (Scene::of_mesh(mesh.clone()).within(frame)).view(View::of_mesh(up));
     Ok(raster(&scene.render([420; 2])?, caption))
 }

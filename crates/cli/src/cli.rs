@@ -1,5 +1,6 @@
 //! What can be typed.
 
+use std::fmt::Display;
 use std::io::Write;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -220,7 +221,6 @@ pub struct ForceOption {
 
 /// Options of every command that computes.
 #[derive(Args, Serialize, Clone, Debug)]
-#[serde(rename_all = "kebab-case")]
 pub struct CommonOptions {
     /// Where to compute: flex or ndarray (CPU), wgpu or cuda (GPU), if compiled in [default: the first compiled in]
     #[arg(long, value_name = "NAME")]
@@ -417,7 +417,6 @@ pub struct InpaintOptions {
 }
 
 #[derive(Args, Serialize, Clone, Debug)]
-#[serde(rename_all = "kebab-case")]
 pub struct McfOptions {
     /// The step of mean curvature flow
     #[arg(long, value_name = "NAME", value_enum, default_value = "network")]
@@ -564,14 +563,10 @@ impl RunCommand {
 impl MessageOptions {
     /// Prints the outcome of a command: an object, or a text for people.
     pub fn report(self, outcome: &Value, text: &str) {
-        if self.to_pipe {
-            return;
-        }
-        // A closed pipe (`| head`) is no reason to fail after the results have been written.
-        if self.json {
-            let _ = writeln!(std::io::stdout(), "{outcome}");
-        } else if !self.quiet {
-            let _ = writeln!(std::io::stdout(), "{text}");
+        let shown: &dyn Display = if self.json { outcome } else { &text };
+        if !self.to_pipe && (self.json || !self.quiet) {
+            // A closed pipe (`| head`) is no reason to fail after the results have been written.
+            let _ = writeln!(std::io::stdout(), "{shown}");
         }
     }
 
@@ -593,16 +588,15 @@ impl MessageOptions {
 }
 
 impl ForceOption {
-    /// Refuses a file that is there, or whose folder is not.
-    pub fn check(self, name: &str, path: &Path) -> Result<()> {
-        let folder = path.parent().unwrap_or(path);
+    /// Refuses a file to save that is there, or whose folder is not.
+    pub fn check(self, path: &Path) -> Result<()> {
+        let (folder, shown) = (path.parent().unwrap_or(path), path.display());
         if !(folder.as_os_str().is_empty() || folder.is_dir()) {
-            refuse!("{name} {}: there is no such folder", path.display());
+            refuse!("--save {shown}: there is no such folder");
         }
         if path.exists() && !self.force {
             refuse!(
-                "{name} {} is there already: give another name, or --force to write over it",
-                path.display()
+                "--save {shown} is there already: give another name, or --force to write over it"
             );
         }
         Ok(())

@@ -35,19 +35,17 @@ fn program() -> clap::Command {
 /// What was typed, together with the configuration file it names.
 pub fn parse(arguments: &[OsString]) -> Result<Cli> {
     let matches = program().try_get_matches_from(arguments)?;
-    let named = matches.subcommand().and_then(|(command, typed)| {
-        let file: Option<&PathBuf> = typed.try_get_one("config").ok().flatten();
-        Some((command, typed, file?))
-    });
-    let Some((command, typed, file)) = named else {
-        return Ok(Cli::from_arg_matches(&matches)?);
-    };
-    let mut text = String::new();
-    // One more than accepted, of what may never end.
-    let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
-    let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
-    read.map_err(files::Error::of("read", file))?;
-    parse_both(arguments, command, typed, &text, file)
+    if let Some((command, typed)) = matches.subcommand()
+        && let Ok(Some(file)) = typed.try_get_one::<PathBuf>("config")
+    {
+        let mut text = String::new();
+        // One more than accepted, of what may never end.
+        let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
+        let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
+        read.map_err(files::Error::of("read", file))?;
+        return parse_both(arguments, command, typed, &text, file);
+    }
+    Ok(Cli::from_arg_matches(&matches)?)
 }
 
 /// The options of a file, and what was typed, which overrides them.
@@ -118,15 +116,12 @@ fn bad(path: &Path, message: impl AsRef<str>) -> Error {
 
 fn read(text: &str, path: &Path) -> Result<Table> {
     if text.len() > LONGEST {
-        return Err(bad(
-            path,
-            format!("a configuration has at most {LONGEST} bytes"),
-        ));
+        let most = format!("a configuration has at most {LONGEST} bytes");
+        return Err(bad(path, most));
     }
     text.parse::<Table>().map_err(|error| {
-        let line = error
-            .span()
-            .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+        let before = error.span().map_or("", |span| &text[..span.start]);
+        let line = 1 + before.matches('\n').count();
         bad(path, format!("line {line}: {}", error.message()))
     })
 }

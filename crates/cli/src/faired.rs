@@ -57,15 +57,6 @@ impl Faired {
     }
 }
 
-/// How surfaces are looked at.
-pub fn view(up: UpAxis) -> View {
-    View {
-        up,
-        azimuth: -60.0,
-        elevation: 25.0,
-    }
-}
-
 /// The zero set as triangles, which would cut off what is round, with its volume where that can be measured.
 pub fn surface(u: &Stored<3>, eps: f64) -> Result<TriangleMesh> {
     let mesh = surfaces::remeshed_surface(u, eps)?;
@@ -115,7 +106,7 @@ pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -
             viridis(length / largest)
         }
     });
-    let scene = Scene::of_mesh(mesh.clone()).view(view(up));
+    let scene = Scene::of_mesh(mesh.clone()).view(View::of_mesh(up));
     let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
     let count = lost.iter().filter(|lost| **lost).count();
     let percent = 100.0 / lengths.len().max(1) as f64;

@@ -8,7 +8,7 @@ use surfaces::shapes::{self, BuiltIn};
 
 use crate::cli::{Holds, InputOptions, Inside, MessageOptions};
 use crate::own::{OwnMesh, thinnest};
-use crate::paths::{absolute, extension, read};
+use crate::paths::{absolute, extension};
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -140,7 +140,7 @@ impl Source {
             Self::Image(_) => true,
             // Whatever else is wrong with the file is said when its values are read.
             Self::Field(path) => {
-                let decoded = npy::decode::<2>(&read(path)?);
+                let decoded = npy::decode::<2>(&files::read(path)?);
                 !matches!(decoded, Err(NpyError::Rank { .. }))
             }
             Self::BuiltIn(name) => shapes::dimension(name)? == 2,
@@ -192,7 +192,6 @@ impl Source {
 /// Reads an input and fills in the options that were left to it.
 pub struct Reader<'a> {
     pub source: Source,
-    name: String,
     options: &'a mut InputOptions,
     eps_over_h: f64,
     messages: MessageOptions,
@@ -221,7 +220,6 @@ impl<'a> Reader<'a> {
             options.input = Some(path.to_string_lossy().into_owned());
         }
         Ok(Self {
-            name: source.name(),
             source,
             options,
             eps_over_h,
@@ -231,7 +229,7 @@ impl<'a> Reader<'a> {
 
     pub fn load(&mut self) -> Result<Loaded> {
         let is_planar = self.source.is_planar()?;
-        let loaded = match self.source.clone() {
+        Ok(match self.source.clone() {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.messages)?;
                 self.mesh(&mesh, surfaces::usual_up_axis(&path)?)?
@@ -243,13 +241,7 @@ impl<'a> Reader<'a> {
             Source::Region(region) if is_planar => Loaded::Plane(self.shape(&*region.shape()?)?),
             Source::Region(region) => Loaded::Space(self.shape(&*region.shape()?)?),
             Source::BuiltIn(name) => self.built_in(&name)?,
-        };
-        let input = self.options.input.as_deref().unwrap_or_default();
-        match &loaded {
-            Loaded::Plane(start) => check_phases(&start.initial, input)?,
-            Loaded::Space(start) => check_phases(&start.initial, input)?,
-        }
-        Ok(loaded)
+        })
     }
 
     /// The grid about 0.
@@ -287,12 +279,14 @@ impl<'a> Reader<'a> {
         Ok(Grid::new(grid.cells(), own)?.with_origin(corner)?)
     }
 
-    /// What comes of the first of some numbers of cells with which all is well, as the attempt says, or of the last.
+    /// What comes of the number of cells that was chosen, or of the first of these with which all is well, as the attempt says, or of the last.
     fn first_good<T>(
         &mut self,
         grids: &[usize],
         attempt: impl Fn(&mut Self) -> Result<(T, bool)>,
     ) -> Result<T> {
+        let chosen = self.options.cells.map(|cells| [cells]);
+        let grids = chosen.as_ref().map_or(grids, |chosen| &chosen[..]);
         let (last, others) = grids.split_last().expect("there is a grid to try");
         for &cells in others {
             self.options.cells = Some(cells);
@@ -312,16 +306,13 @@ impl<'a> Reader<'a> {
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>> {
-        let chosen = self.options.cells;
-        let (grid, thin) = self.first_good(
-            &chosen.map_or(grids.to_vec(), |cells| vec![cells]),
-            |reader| {
-                let grid = reader.grid_around(bounds, PART)?;
-                let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
-                Ok(((grid, thin), thin < THIN_PART))
-            },
-        )?;
-        self.tell_thin(thin, &grid, WILL_NOT_LAST, chosen.is_none())?;
+        let is_chosen = self.options.cells.is_some();
+        let (grid, thin) = self.first_good(grids, |reader| {
+            let grid = reader.grid_around(bounds, PART)?;
+            let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
+            Ok(((grid, thin), thin < THIN_PART))
+        })?;
+        self.tell_thin(thin, &grid, WILL_NOT_LAST, !is_chosen)?;
         Ok(grid)
     }
 
@@ -396,33 +387,32 @@ impl<'a> Reader<'a> {
 
     /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
     fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded> {
-        let chosen = self.options.cells.is_some();
+        let chosen = self.options.cells;
         let sides = mesh.mesh().sides(MOST_RAYS);
         let distance = MeshDistance::new(mesh);
         self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
-        let cells = self.cells();
-        let finer = MESH_CELLS.into_iter().chain(FINER_CELLS);
-        let finer = finer.filter(|&finer| !chosen && finer > cells);
-        let grids: Vec<usize> = std::iter::once(cells).chain(finer).collect();
+        let coarsest = std::mem::replace(&mut self.options.cells, chosen);
+        let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
+        let grids: Vec<usize> = grids.filter(|&cells| Some(cells) >= coarsest).collect();
         let advice =
             "give a larger --side-length or more --cells, or these --cells to go on without them";
-        let (field, _) = self.like_mesh(mesh, PART, &grids, (!chosen).then_some(advice))?;
+        let refused = chosen.is_none().then_some(advice);
+        let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
         let space = Space {
             up,
             input: Some(Topology::of(mesh)),
             ..Space::default()
         };
-        Ok(Loaded::Space(self.start(field, space)))
+        Ok(Loaded::Space(self.start(field, space)?))
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
     pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded> {
         let (rough, start) = (own.rough(), &own.fairing().start);
-        let grids = (self.options.cells).map_or(OWN_CELLS.to_vec(), |cells| vec![cells]);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let advice = "use more --cells, or --allow-loss to go on without them";
         let refused = (!allow_loss).then_some(advice);
-        let (field, surface) = self.like_mesh(start, part, &grids, refused)?;
+        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refused)?;
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);
         let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
@@ -439,14 +429,18 @@ impl<'a> Reader<'a> {
             far_from(start, surface.as_ref(), &field)
         ));
         let region = own.nodes(grid);
-        let space = Space {
+        let presentation = Space {
             up: surfaces::usual_up_axis(path)?,
             input: Some(Topology::of(rough)),
             own: Some(own),
             ..Space::default()
         };
-        let start = self.start(field, space);
-        Ok(Loaded::Space(Start { region, ..start }))
+        Ok(Loaded::Space(Start {
+            name: self.source.name(),
+            initial: field,
+            presentation,
+            region,
+        }))
     }
 
     /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
@@ -473,13 +467,17 @@ impl<'a> Reader<'a> {
         &self,
         initial: impl Into<Stored<D>>,
         presentation: O,
-    ) -> Start<D, O> {
-        Start {
-            name: self.name.clone(),
-            initial: initial.into(),
+    ) -> Result<Start<D, O>> {
+        let initial: Stored<D> = initial.into();
+        check_phases(&initial, self.options.input.as_deref().unwrap_or_default())?;
+        let label = self.options.label;
+        let label = label.map_or(String::new(), |label| format!("-label{label}"));
+        Ok(Start {
+            name: self.source.name() + &label,
+            initial,
             presentation,
             region: None,
-        }
+        })
     }
 
     fn shape<const D: usize, O: Presentation<D>>(
@@ -488,7 +486,7 @@ impl<'a> Reader<'a> {
     ) -> Result<Start<D, O>> {
         let grid = self.grid()?;
         let field = stored_phase_field(grid, shape, self.eps(&grid))?;
-        Ok(self.start(field, O::of_box(&grid)?))
+        self.start(field, O::of_box(&grid)?)
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded> {
@@ -521,22 +519,29 @@ impl<'a> Reader<'a> {
         };
         let plane = Plane::of_image(&image, path)?;
         let tones = Tones::of(&image, side);
-        if self.options.inside.is_none() && self.options.threshold.is_none() {
-            refuse_photographs(&tones, side, path)?;
+        let is_said = self.options.inside.is_some() || self.options.threshold.is_some();
+        if tones.between >= PHOTOGRAPH && !is_said {
+            refuse!(
+                "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, \
+                 which separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so \
+                 by --threshold or --inside",
+                path.display(),
+                100.0 * tones.between,
+                tones.threshold,
+                side.at(tones.threshold),
+                100.0 * tones.inside,
+            );
         }
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
         let distance = outline.distance();
         let sides = outline.sides();
         let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
         let field = stored_phase_field(grid, &distance, self.eps(&grid))?;
-        Ok(Loaded::Plane(self.start(field, plane)))
+        Ok(Loaded::Plane(self.start(field, plane)?))
     }
 
     fn volume(&mut self, path: &Path) -> Result<Loaded> {
         let body = volume::body(path, self.options)?;
-        if let Some(label) = self.options.label {
-            self.name = format!("{}-label{label}", self.name);
-        }
         let bounds = body.surface.bounding_box();
         let distance = MeshDistance::new(&body.surface);
         let sides = body.surface.mesh().sides(MOST_RAYS);
@@ -570,7 +575,7 @@ impl<'a> Reader<'a> {
             voxels,
             ..Space::default()
         };
-        Ok(Loaded::Space(self.start(field, space)))
+        Ok(Loaded::Space(self.start(field, space)?))
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Stored<3>> {
@@ -590,18 +595,16 @@ impl<'a> Reader<'a> {
     }
 
     fn values<const D: usize, O: Presentation<D>>(&mut self, path: &Path) -> Result<Start<D, O>> {
-        let holds = *self.options.holds.get_or_insert(Holds::PhaseField);
-        let (_, side) = usual_box::<D>();
-        let side = *self.options.box_side.get_or_insert(side);
+        let is_phase = *self.options.holds.get_or_insert(Holds::PhaseField) == Holds::PhaseField;
+        let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
         let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;
         let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
-        if let (Holds::PhaseField, Some(value)) = (holds, outside) {
+        if let (true, Some(value)) = (is_phase, outside) {
             refuse!(
                 "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
                 path.display()
             );
         }
-        let is_phase = holds == Holds::PhaseField;
         if self.options.cells.is_some() {
             // Distances are linear across the interface, as what lies between the nodes is taken to be.
             if is_phase {
@@ -615,7 +618,7 @@ impl<'a> Reader<'a> {
             field = field.map(|s| optimal_profile(s, eps));
         }
         let presentation = O::of_box(field.grid())?;
-        Ok(self.start(field, presentation))
+        self.start(field, presentation)
     }
 }
 
@@ -632,23 +635,6 @@ fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>, field: &Stored<3>) 
     let far = hausdorff_distance(surface, mesh);
     let percent = 100.0 * far / mesh.bounding_box().longest_side();
     format!("at most {far:.3e} ({percent:.3} % of the longest side) from that of the mesh")
-}
-
-/// Refuses images that are no drawings, unless it is said what is to be inside.
-fn refuse_photographs(tones: &Tones, side: Side, path: &Path) -> Result<()> {
-    if tones.between >= PHOTOGRAPH {
-        refuse!(
-            "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, which \
-         separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so by \
-         --threshold or --inside",
-            path.display(),
-            100.0 * tones.between,
-            tones.threshold,
-            side.at(tones.threshold),
-            100.0 * tones.inside,
-        );
-    }
-    Ok(())
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.

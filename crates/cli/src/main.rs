@@ -1,5 +1,6 @@
 //! `willmore`: Willmore flow from the command line.
 
+mod case;
 mod cli;
 mod commands;
 mod config;
@@ -15,8 +16,6 @@ mod plane;
 mod prelude;
 mod presentation;
 mod run;
-mod setup;
-mod sizes;
 mod space;
 mod standard;
 mod values;
@@ -26,7 +25,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use crate::cli::{Cli, Command};
-use crate::commands::{check, flow, info, networks, resume, sample, shell, train};
+use crate::commands::{about, check, flow, resume, sample, train};
 use crate::prelude::*;
 use crate::standard::Standard;
 
@@ -58,16 +57,16 @@ fn execute(mut cli: Cli) -> Result<()> {
     match cli.command {
         Command::Run(command) => flow::run(command, messages, None),
         Command::Resume(options) => resume::run(&options, messages),
-        Command::Networks { show } => networks::run(show.as_ref(), messages),
-        Command::Info => info::run(messages),
+        Command::Networks { show } => about::networks(show.as_ref(), messages),
+        Command::Info => about::info(messages),
         Command::Sample(options) => sample::run(options, messages),
         Command::Check(options) => check::run(options, messages),
         Command::Train(options) => train::run(options, messages),
         Command::Completions { shell } => {
-            shell::completions(shell);
+            about::completions(shell);
             Ok(())
         }
-        Command::Man => shell::man(),
+        Command::Man => about::man(),
     }?;
     standard.write()
 }

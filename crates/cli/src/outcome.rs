@@ -8,7 +8,7 @@ use crate::prelude::*;
 pub const SIZES: [&str; 3] = ["length", "area", "volume"];
 
 /// How far a run has come.
-pub fn progress(steps: u64, time: f64) -> String {
+pub fn progress(steps: usize, time: f64) -> String {
     let plural = if steps == 1 { "" } else { "s" };
     format!("{steps} step{plural} to t = {time:.4e}")
 }

@@ -7,8 +7,9 @@ use surfaces::{Followed, Warning};
 
 use crate::faired::{Faired, figure, report, surface};
 use crate::keep::{Keep, key};
-use crate::paths::{extension, read};
+use crate::paths::extension;
 use crate::prelude::*;
+use crate::presentation::Known;
 
 /// The name of the copy of the input, without its extension.
 pub const INPUT: &str = "input";
@@ -55,7 +56,7 @@ impl OwnMesh {
             keep,
             ..Self::default()
         };
-        let mask = own.mask().map(|(path, _)| read(path)).transpose()?;
+        let mask = own.mask().map(|(path, _)| files::read(path)).transpose()?;
         let warnings = own.load(bytes, path, mask)?;
         Ok((own, warnings))
     }
@@ -143,24 +144,23 @@ impl OwnMesh {
         Ok(self.fairing().follow(in_place, start, eps)?)
     }
 
-    /// How far the vertices have gone along the normals, root of the mean square.
-    pub fn measure(&self, start: &Stored<3>, eps: f64) -> Result<Measure<3>> {
+    /// How far the vertices have gone along the normals, root of the mean square, is measured, and the flow ends when the noise is off.
+    pub fn known(&self, start: &Stored<3>, eps: f64) -> Result<Known<3>> {
         let (fairing, followed) = (self.fairing().clone(), self.followed(start, eps)?);
-        Ok(Measure::new(DISPLACEMENT, move |u, _| {
+        let mut stops = Vec::new();
+        if self.noise != 0.0 {
+            stops.push(Stop::Time(fairing.time(start.grid().spacing(), 1.0)));
+            stops.push(Stop::Displacement(fairing.farthest()));
+        }
+        let gone = Measure::new(DISPLACEMENT, move |u, _| {
             // A field that is not finite stops the run elsewhere.
             Ok(fairing.displacement(&followed, u).ok())
-        }))
-    }
-
-    /// When the noise is off.
-    pub fn stops(&self, spacing: f64) -> Vec<Stop> {
-        if self.noise == 0.0 {
-            return Vec::new();
-        }
-        vec![
-            Stop::Time(self.fairing().time(spacing, 1.0)),
-            Stop::Displacement(self.fairing().farthest()),
-        ]
+        });
+        Ok(Known {
+            volume: self.keeps_volume.then(|| self.rough().volume()),
+            measures: vec![gone],
+            stops,
+        })
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.

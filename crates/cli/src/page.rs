@@ -5,12 +5,16 @@
 
 use engine::METRICS;
 use pages::{
+<<<<<<< ours
     Facts, Image, Markup, Page, Section, Table, figure, five_digits, frames, markdown, thinned,
     viewer,
+=======
+    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer, five_digits,
+    thinned,
+>>>>>>> theirs
 };
 use report::{Axis, LineChart, Marker, Series};
 
-use crate::faired::view;
 use crate::paths::MESHES;
 use crate::prelude::*;
 use crate::{config, outcome, own, plane, presentation};
@@ -24,12 +28,11 @@ const MOST_ROWS: usize = 60;
 /// Curves through fewer steps have a mark at each.
 const FEW_STEPS: usize = 40;
 
-/// Writes the page of a run and returns its path.
-pub fn write(run: &StoredRun) -> Result<PathBuf> {
-    let path = run.path().join(presentation::PAGE);
+/// Writes the page of a run.
+pub fn write(run: &StoredRun) -> Result<()> {
     let records = engine::records(run)?;
-    Files { run, records }.page()?.write(&path)?;
-    Ok(path)
+    let page = Files { run, records }.page()?;
+    Ok(page.write(run.path().join(presentation::PAGE))?)
 }
 
 struct Files<'a> {
@@ -41,7 +44,10 @@ impl Files<'_> {
     fn page(&self) -> Result<Page> {
         let about = &engine::notes(self.run)["about"];
         let text = |name: &str| about[name].as_str().unwrap_or_default();
-        let outcome = self.outcome()?;
+        let outcome: Option<Value> = (self.read(presentation::SUMMARY)?)
+            .map(|bytes| serde_json::from_slice(&bytes))
+            .transpose()
+            .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
         let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
             .with_lead(self.lead(outcome.as_ref()));
         if let Some(shape) = self.shape()? {
@@ -59,14 +65,6 @@ impl Files<'_> {
         let options = Section::new("Options").with(facts(&options));
         let program = Section::new("Program, network and device").with(facts(about));
         Ok(page.with(numbers.with(options).with(program)))
-    }
-
-    fn outcome(&self) -> Result<Option<Value>> {
-        let bytes = self.read(presentation::SUMMARY)?;
-        let outcome = bytes
-            .map(|bytes| serde_json::from_slice(&bytes))
-            .transpose();
-        outcome.map_err(|error| Error::options(format!("the stored outcome: {error}")))
     }
 
     /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
@@ -105,8 +103,20 @@ impl Files<'_> {
         Ok((!drawings.is_empty()).then(|| frames("The shape over the steps", &drawings)))
     }
 
+<<<<<<< ours
     fn surfaces(&self) -> Result<Option<Markup>> {
         let stages = self.stages(self.before(), &MESHES);
+=======
+    fn surfaces(&self) -> Result<Option<Viewer>> {
+        // Where the vertices of a mesh follow the flow, it is itself the shape at the beginning.
+        let is_own = (self.run.files()).any(|name| name.starts_with(own::INPUT));
+        let before = if is_own {
+            own::INPUT
+        } else {
+            presentation::START
+        };
+        let stages = self.stages(before, &MESHES);
+>>>>>>> theirs
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
         else {
@@ -126,20 +136,15 @@ impl Files<'_> {
         Ok(Some(viewer(
 >>>>>>> theirs
             "The surface over the steps",
+<<<<<<< ours
             &Image::from_bytes(presentation::PICTURE, &poster)?,
             view(up.unwrap_or_default()),
+=======
+            Image::from_bytes(presentation::PICTURE, &poster)?,
+            View::of_mesh(up.unwrap_or_default()),
+>>>>>>> theirs
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
-    }
-
-    /// What shows the shape at the beginning: the mesh itself where its vertices follow the flow.
-    fn before(&self) -> &'static str {
-        let is_input = |name: &str| name.starts_with(own::INPUT);
-        if self.run.files().any(is_input) {
-            own::INPUT
-        } else {
-            presentation::START
-        }
     }
 
     /// Labels and files of the shape before, in the frames between, and after, each in the first of these formats that it has.
@@ -194,9 +199,16 @@ impl Files<'_> {
             "{shown} of {all} steps in five digits; all digits of all steps are in `{METRICS}`."
         );
         let head = table.head().iter().map(|key| in_words(&COLUMNS, key));
+<<<<<<< ours
         let rows = rows().map(|row| row.iter().map(|cell| shortened(cell)));
         let table = Section::new("Steps as a table")
             .with(markdown(&note))
+=======
+        let shortened = |cell: &String| cell.parse().map_or_else(|_| cell.clone(), five_digits);
+        let rows = rows().map(|row| row.iter().map(shortened));
+        let details = Details::new("Steps as a table")
+            .with(Text::markdown(&note))
+>>>>>>> theirs
             .with(Table::new("Steps", head, rows)?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
         Ok(Section::new("Steps")
@@ -215,7 +227,7 @@ impl Files<'_> {
     fn lead(&self, outcome: Option<&Value>) -> String {
         let last = self.records.last();
         let (step, time) = last.map_or((0, 0.0), |last| (last.step, last.time));
-        let progress = outcome::progress(step as u64, time);
+        let progress = outcome::progress(step, time);
         let Some(outcome) = outcome else {
             return format!("Not finished: {progress} so far.");
         };
@@ -233,10 +245,6 @@ impl Files<'_> {
         let bytes = self.has(name).then(|| self.run.read(name));
         Ok(bytes.transpose()?)
     }
-}
-
-fn shortened(cell: &str) -> String {
-    cell.parse().map_or_else(|_| cell.to_owned(), five_digits)
 }
 
 /// The entries of a map.

@@ -15,8 +15,3 @@ pub fn extension(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     extension.to_ascii_lowercase()
 }
-
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>> {
-    let path = path.as_ref();
-    Ok(std::fs::read(path).map_err(files::Error::of("read", path))?)
-}

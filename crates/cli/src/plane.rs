@@ -3,7 +3,7 @@
 use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
-use crate::paths::{extension, read};
+use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
 
@@ -69,7 +69,7 @@ impl Plane {
         let Some(path) = &self.image else {
             return Ok(());
         };
-        let picture = images::colours(path, &read(path)?)?;
+        let picture = images::colours(path, &files::read(path)?)?;
         let width = self.frame.size()[0] as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
@@ -106,18 +106,12 @@ impl Original {
         let drawn = (0..self.drawn.len()).filter(|&pixel| self.drawn[pixel]);
         let mask = BoundingBox::around(drawn.map(place))?;
         let margins = mask.extent().map(|side| 8.0 + (side / 4.0).floor());
-        let is_near = |pixel: usize| {
-            let at = place(pixel);
-            (0..2).all(|axis| {
-                let (low, high) = (mask.lower[axis], mask.upper[axis]);
-                (low - margins[axis]..=high + margins[axis]).contains(&at[axis])
-            })
-        };
+        let around = mask.grown(margins);
         let mean = |near: bool| {
             let (mut sum, mut count) = ([0.0; 4], 0.0);
             for (pixel, own) in self.picture.pixels().iter().enumerate() {
                 let fits = drawing.pixels()[pixel][3] == opacity && !self.drawn[pixel];
-                if fits && (!near || is_near(pixel)) {
+                if fits && (!near || around.contains(place(pixel))) {
                     count += 1.0;
                     sum = std::array::from_fn(|c| sum[c] + f64::from(own[c]));
                 }

@@ -12,14 +12,12 @@ use crate::cli::{InputOptions, MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
 use crate::page;
-use crate::paths::read;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
 
 /// Everything about a run but its case.
 pub struct Plan<const D: usize, O> {
     pub command: &'static str,
-    pub name: String,
     pub presentation: O,
     pub options: RunOptions,
     /// The extension of meshes, if it is not the usual one.
@@ -34,7 +32,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         json!({
             "about": {
                 "command": self.command,
-                "name": self.name,
+                "name": case.shape,
                 "program": format!("willmore {}", env!("CARGO_PKG_VERSION")),
                 "network": network.map(|n| json!({ "name": n.name, "checksum": n.network.fingerprint() })),
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
@@ -62,13 +60,9 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
         ));
         let folder = store.directory().path().to_owned();
-        let steps = run.case().stops.iter().find_map(|stop| match stop {
-            Stop::Steps(steps) => Some(*steps as u64),
-            _ => None,
-        });
         let progress = self.messages.progress();
-        let title = format!("{} of {}", self.command, self.name);
-        let mut bar = progress.bar(title, steps.unwrap_or(0));
+        let title = format!("{} of {}", self.command, run.case().shape);
+        let mut bar = progress.bar(title, self.options.steps.unwrap_or(0) as u64);
         let clock = Instant::now();
         let mut pictures = Pictures {
             plan: self,
@@ -89,11 +83,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
         bar.finish();
         progress.clear();
-        self.tell(outcome, &folder, ended, seconds);
-        match ended {
-            Some(_) => Ok(()),
-            None => Err(Error::Interrupted),
-        }
+        self.tell(&run, outcome, &folder, seconds);
+        ended.map(|_| ()).ok_or(Error::Interrupted)
     }
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
@@ -128,7 +119,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             if !pictures.is_empty() {
                 let frame = |index: usize| -> Result<Picture> {
                     let picture = &pictures[index];
-                    Ok(images::colours(picture, &read(picture)?)?)
+                    Ok(images::colours(picture, &files::read(picture)?)?)
                 };
                 let animation = render::animation(pictures.len(), frame)?;
                 directory.write_file(presentation::ANIMATION, &animation)?;
@@ -238,9 +229,8 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
     }
 
-    fn tell(&self, mut outcome: Value, folder: &Path, ended: Option<Stop>, seconds: f64) {
-        let (steps, time) = (outcome["steps"].as_u64(), outcome["time"].as_f64());
-        let progress = outcome::progress(steps.unwrap_or(0), time.unwrap_or(0.0));
+    fn tell(&self, run: &Run<D>, mut outcome: Value, folder: &Path, seconds: f64) {
+        let (progress, ended) = (outcome::progress(run.steps(), run.time()), run.ended());
         let reason = match ended {
             None | Some(Stop::Steps(_)) => String::new(),
             Some(stop) => format!(": {stop}"),

@@ -1,8 +1,9 @@
 //! Surfaces in space.
 
 use geometry::measure::bounding_box;
+use render::View;
 
-use crate::faired::{Faired, surface, view};
+use crate::faired::{Faired, surface};
 use crate::own::OwnMesh;
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -48,17 +49,11 @@ impl Presentation<3> for Space {
     }
 
     fn picture(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Picture> {
-        let mut scene = Scene::new(u, eps)?.view(view(self.up));
+        let mut scene = Scene::new(u, eps)?.view(View::of_mesh(self.up));
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
-        let start = bounding_box(start).map(|bounds| {
-            let room = ROOM * bounds.longest_side();
-            [
-                bounds.lower.map(|x| x - room),
-                bounds.upper.map(|x| x + room),
-            ]
-        });
-        let now = scene.bounds().map(|bounds| [bounds.lower, bounds.upper]);
-        if let Some(frame) = BoundingBox::around(start.into_iter().chain(now).flatten()) {
+        let start = bounding_box(start).map(|b| b.grown([ROOM * b.longest_side(); 3]));
+        let both = start.into_iter().chain(scene.bounds());
+        if let Some(frame) = BoundingBox::around(both.flat_map(|b| [b.lower, b.upper])) {
             scene = scene.within(frame);
         }
         Ok(scene.render([PIXELS; 2])?)
@@ -92,12 +87,10 @@ impl Presentation<3> for Space {
     }
 
     fn known(&self, start: &Stored<3>, eps: f64) -> Result<Known<3>> {
-        let mut known = Known::default();
         if let Some(own) = &self.own {
-            known.volume = own.keeps_volume.then(|| own.rough().volume());
-            known.measures.push(own.measure(start, eps)?);
-            known.stops = own.stops(start.grid().spacing());
+            return own.known(start, eps);
         }
+        let mut known = Known::default();
         if let Some(voxels) = &self.voxels {
             known.volume = Some(voxels.volume);
             known.measures.push(Measure::displacement(start, eps));

@@ -1,57 +1,66 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
-use std::fs::File;
 use std::io::{Read, Write};
+
+use tempfile::TempDir;
 
 use crate::cli::{Command, InputOptions, MessageOptions};
 use crate::input::usual_format;
-use crate::paths::read;
 use crate::prelude::*;
 use crate::values::Label;
 
-/// The files, which are removed in the end.
+/// The files, in a folder of their own that nobody else can write to; it is removed in the end.
 #[derive(Default)]
 pub struct Standard {
-    input: Option<PathBuf>,
     output: Option<PathBuf>,
+    _folder: Option<TempDir>,
 }
 
 impl Standard {
     /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
     pub fn open(command: &mut Command, messages: &mut MessageOptions) -> Result<Self> {
-        let mut standard = Self::default();
         let Some((input, save)) = paths(command) else {
-            return Ok(standard);
+            return Ok(Self::default());
         };
-        if input.input.as_deref() == Some("-") {
+        let reads = input.input.as_deref() == Some("-");
+        let save = save.filter(|path| path.as_os_str() == "-");
+        if !reads && save.is_none() {
+            return Ok(Self::default());
+        }
+        let folder = tempfile::tempdir();
+        let folder = folder.map_err(files::Error::of("make a folder in", std::env::temp_dir()))?;
+        let place = |what: &str, format: &str| {
+            let name = format!("willmore-{}-{what}.{format}", std::process::id());
+            folder.path().join(name)
+        };
+        if reads {
             let mut bytes = Vec::new();
-            let name = "standard input";
             let read = std::io::stdin().read_to_end(&mut bytes);
-            read.map_err(files::Error::of("read", name))?;
+            read.map_err(files::Error::of("read", "standard input"))?;
             if bytes.is_empty() {
                 refuse!("standard input is empty: pipe a mesh, an image or a field into it");
             }
-            let path = stand_in("input", kind(&bytes));
-            // Never through a link that somebody else has put there.
-            let written = File::create_new(&path).and_then(|mut file| file.write_all(&bytes));
-            written.map_err(files::Error::of("write", &path))?;
+            let path = place("input", kind(&bytes));
+            std::fs::write(&path, &bytes).map_err(files::Error::of("write", &path))?;
             input.input = Some(path.to_string_lossy().into_owned());
-            standard.input = Some(path);
         }
-        let Some(save) = save.filter(|path| path.as_os_str() == "-") else {
-            return Ok(standard);
-        };
-        if messages.json {
-            refuse!("--json and --save - would both write to standard output: leave one out");
+        let mut output = None;
+        if let Some(save) = save {
+            if messages.json {
+                refuse!("--json and --save - would both write to standard output: leave one out");
+            }
+            if input.label == Some(Label::All) {
+                refuse!("--save - writes one mesh, and --label all makes several: give a file");
+            }
+            messages.to_pipe = true;
+            let format = usual_format(input.input.as_deref().unwrap_or_default())?;
+            *save = place("output", &format);
+            output = Some(save.clone());
         }
-        if input.label == Some(Label::All) {
-            refuse!("--save - writes one mesh, and --label all makes several: give a file");
-        }
-        messages.to_pipe = true;
-        let format = usual_format(input.input.as_deref().unwrap_or_default())?;
-        *save = stand_in("output", &format);
-        standard.output = Some(save.clone());
-        Ok(standard)
+        Ok(Self {
+            output,
+            _folder: Some(folder),
+        })
     }
 
     pub fn write(&self) -> Result<()> {
@@ -61,17 +70,8 @@ impl Standard {
         if !path.exists() {
             refuse!("nothing is written to standard output: the shape has vanished");
         }
-        let written = std::io::stdout().write_all(&read(path)?);
+        let written = std::io::stdout().write_all(&files::read(path)?);
         Ok(written.map_err(files::Error::of("write", "standard output"))?)
-    }
-}
-
-impl Drop for Standard {
-    fn drop(&mut self) {
-        for path in self.input.iter().chain(&self.output) {
-            // There is none where the command failed before.
-            let _ = std::fs::remove_file(path);
-        }
     }
 }
 
@@ -86,12 +86,6 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBu
         }
         _ => None,
     }
-}
-
-/// A name that no other process has.
-fn stand_in(what: &str, format: &str) -> PathBuf {
-    let name = format!("willmore-{}-{what}.{format}", std::process::id());
-    std::env::temp_dir().join(name)
 }
 
 /// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.

@@ -44,10 +44,15 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside> {
     )
 }
 
-/// The labels of a volume but 0, of which there must be some, if all are to become surfaces.
-pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
+/// Does the same with each label of a volume but 0, of which there must be some, if all are to become surfaces, and says whether they are.
+/// Where one fails it goes on with the next, until it is interrupted.
+pub fn with_each_label(
+    options: &InputOptions,
+    messages: MessageOptions,
+    mut act: impl FnMut(i64) -> Result<()>,
+) -> Result<bool> {
     let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
-        return Ok(None);
+        return Ok(false);
     };
     let path = absolute(input)?;
     let labels = volumes::read(&path)?.labels().unwrap_or_default();
@@ -59,15 +64,6 @@ pub fn all_labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
             path.display()
         );
     }
-    Ok(Some(labels))
-}
-
-/// Does the same with each label, and goes on with the next where one fails, until it is interrupted.
-pub fn for_each(
-    labels: Vec<i64>,
-    messages: MessageOptions,
-    mut act: impl FnMut(i64) -> Result<()>,
-) -> Result<()> {
     let mut failed = Vec::new();
     for label in labels {
         match act(label) {
@@ -85,7 +81,7 @@ pub fn for_each(
             failed.join(", ")
         );
     }
-    Ok(())
+    Ok(true)
 }
 
 /// The name of a file or folder for one of several labels.

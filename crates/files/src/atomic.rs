@@ -82,6 +82,15 @@ pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<
     (storage.sync_folder(folder)).map_err(Error::of("flush the folder of", path))
 }
 
+/// The bytes of a file.
+///
+/// # Errors
+/// [`Error`] with the path.
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
+    let path = path.as_ref();
+    std::fs::read(path).map_err(Error::of("read", path))
+}
+
 /// Proves that files can be made in a folder, by making one and removing it.
 pub fn probe(folder: impl AsRef<Path>) -> Result<(), Error> {
     let folder = folder.as_ref();

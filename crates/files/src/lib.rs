@@ -26,7 +26,9 @@ mod number;
 mod storage;
 mod text;
 
-pub use atomic::{TEMPORARY_PREFIX, make_folders_on, probe, write_atomically, write_atomically_on};
+pub use atomic::{
+    TEMPORARY_PREFIX, make_folders_on, probe, read, write_atomically, write_atomically_on,
+};
 pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
 pub use number::{Number, unsigned};

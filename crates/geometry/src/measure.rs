@@ -205,6 +205,15 @@ impl<const D: usize> BoundingBox<D> {
         self.extent().into_iter().fold(0.0, f64::max)
     }
 
+    /// The box with so much more on both sides along each axis.
+    #[must_use]
+    pub fn grown(&self, by: [f64; D]) -> Self {
+        Self {
+            lower: std::array::from_fn(|axis| self.lower[axis] - by[axis]),
+            upper: std::array::from_fn(|axis| self.upper[axis] + by[axis]),
+        }
+    }
+
     /// Whether the point lies in the box or on its faces.
     pub fn contains(&self, x: [f64; D]) -> bool {
         (0..D).all(|i| (self.lower[i]..=self.upper[i]).contains(&x[i]))

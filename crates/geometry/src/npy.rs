@@ -90,7 +90,7 @@ pub fn read<const D: usize>(
     grid: impl FnOnce(usize) -> Result<Grid<D>, Error>,
 ) -> Result<Field<D>, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
+    let bytes = files::read(path)?;
     let (cells, values) = decode::<D>(&bytes).map_err(|source| Error::Npy {
         path: path.into(),
         source,

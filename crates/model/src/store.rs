@@ -228,7 +228,7 @@ impl Network {
     /// # Errors
     /// [`Error::File`] if it cannot be read, [`Error::Weights`] if it is not a network.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let data = std::fs::read(path).map_err(files::Error::of("read", path))?;
+        let data = files::read(path)?;
         Self::from_bytes(&data, path)
     }
 }

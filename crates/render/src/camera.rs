@@ -35,6 +35,15 @@ impl Default for View {
 }
 
 impl View {
+    /// The usual one of meshes from files: from the front left and a little above.
+    pub fn of_mesh(up: UpAxis) -> Self {
+        Self {
+            up,
+            azimuth: -60.0,
+            elevation: 25.0,
+        }
+    }
+
     /// Accepts finite angles, and elevations from -90 to 90 degrees.
     pub fn check(&self) -> Result<(), Error> {
         require("azimuth", self.azimuth, "finite", |_| true)?;

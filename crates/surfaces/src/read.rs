@@ -34,7 +34,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
     let path = path.as_ref();
     // Before a long file is read in vain.
     Format::of(path)?;
-    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
+    let bytes = files::read(path)?;
     decode(&bytes, path)
 }
 

@@ -35,7 +35,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// Truncated and overlong files are refused, and values that are not finite.
 pub fn read(path: impl AsRef<Path>) -> Result<Volume, Error> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(files::Error::of("read", path))?;
+    let bytes = files::read(path)?;
     decode(&bytes).map_err(|problem| Error::Format {
         path: path.into(),
         problem,

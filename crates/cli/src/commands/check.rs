@@ -1,4 +1,3 @@
-use std::fmt::Write;
 use std::sync::Arc;
 
 use chacha20::ChaCha8Rng;
@@ -38,14 +37,14 @@ pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
         Loaded::Plane(start) => findings(&start.initial.field()?, &options, &device)?,
         Loaded::Space(start) => findings(&start.initial.field()?, &options, &device)?,
     };
-    let mut text = String::new();
-    for finding in &findings {
+    let line = |finding: &Finding| {
         let verdict = if finding.passed { "ok" } else { "WRONG" };
-        let _ = writeln!(text, "{verdict:6}{}: {}", finding.name, finding.words);
-    }
+        format!("{verdict:6}{}: {}", finding.name, finding.words)
+    };
+    let text: Vec<String> = findings.iter().map(line).collect();
     let outcome =
         json!({ "command": "check", "device": options.common.device, "checks": findings });
-    messages.report(&outcome, text.trim_end());
+    messages.report(&outcome, &text.join("\n"));
     let failed = findings.iter().filter(|finding| !finding.passed);
     let failed: Vec<&str> = failed.map(|finding| finding.name).collect();
     if !failed.is_empty() {
@@ -69,37 +68,35 @@ fn findings<const D: usize>(
         newton: scales.newton,
         calibration: Factors::PAPER,
     };
-    let at =
-        |device: &ComputeDevice| derivatives(field, network, &params, options.common.seed, device);
+    let at = |device: &_| derivatives(field, network, &params, options.common.seed, device);
     let here = at(device)?;
     let mut findings = Vec::new();
+    let mut add = |name, found, words, passed| {
+        findings.push(Finding {
+            name,
+            found,
+            words,
+            passed,
+        });
+    };
     for (name, derivatives, expected) in [("gradient", 1, 2.0), ("Hessian", 2, 3.0)] {
         // It asks for them in this order.
         let mut values = here.values.iter().copied();
         let value = |_: f64| values.next().unwrap_or(f64::NAN);
         let steps = halvings(FIRST_STEP, STEPS);
         let rest = remainder(value, &here.along[..derivatives], &steps, device.epsilon());
-        let rate = rest.rate();
-        findings.push(Finding {
-            name,
-            found: rate,
-            words: match rate {
-                Some(rate) => format!("the remainder of the Taylor expansion decays like t^{rate:.2}, expected t^{expected}"),
-                None => "the remainder of the Taylor expansion is rounding error".to_owned(),
-            },
-            passed: rest.is_consistent(SHORT),
-        });
+        let words = match rest.rate() {
+            Some(rate) => format!("decays like t^{rate:.2}, expected t^{expected}"),
+            None => "is rounding error".to_owned(),
+        };
+        let words = format!("the remainder of the Taylor expansion {words}");
+        add(name, rest.rate(), words, rest.is_consistent(SHORT));
     }
     let limit = ROUNDING * device.epsilon();
-    findings.push(Finding {
-        name: "symmetry",
-        found: Some(here.asymmetry),
-        words: format!(
-            "<p, H q> and <q, H p> differ by {:.1e}, at most {limit:.1e} is rounding",
-            here.asymmetry
-        ),
-        passed: here.asymmetry <= limit,
-    });
+    let found = here.asymmetry;
+    let words =
+        format!("<p, H q> and <q, H p> differ by {found:.1e}, at most {limit:.1e} is rounding");
+    add("symmetry", Some(found), words, found <= limit);
     let other = DeviceKind::compiled().find(|&kind| kind != device.kind() && kind.is_cpu());
     if let Some(kind) = other {
         let cpu = ComputeDevice::open(kind)?;
@@ -108,13 +105,11 @@ fn findings<const D: usize>(
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max);
         let largest = there.gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
-        let difference = difference / largest.max(f64::MIN_POSITIVE);
-        findings.push(Finding {
-            name: "device",
-            found: Some(difference),
-            words: format!("gradients differ from those on {kind} by {difference:.1e}, at most {limit:.1e} is rounding"),
-            passed: difference <= limit,
-        });
+        let found = difference / largest.max(f64::MIN_POSITIVE);
+        let words = format!(
+            "gradients differ from those on {kind} by {found:.1e}, at most {limit:.1e} is rounding"
+        );
+        add("device", Some(found), words, found <= limit);
     }
     Ok(findings)
 }

@@ -4,7 +4,7 @@ use crate::cli::{FairOptions, MessageOptions};
 use crate::input::{Loaded, Source, closed};
 use crate::keep::Keep;
 use crate::own::OwnMesh;
-use crate::paths::{absolute, read};
+use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::SizeTarget;
 
@@ -98,7 +98,7 @@ impl FairOptions {
         let bytes = if repairs {
             surfaces::encode(path, closed(path, true, messages)?.mesh())?
         } else {
-            read(path)?
+            files::read(path)?
         };
         let noise = self.noise.or(self.ends.then_some(0.0));
         let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
@@ -141,7 +141,6 @@ impl FairOptions {
             }
             self.noise = Some(noise);
         }
-        let mut reader = self.flow.run.reader(messages)?;
-        reader.own(own, path, self.allow_loss)
+        (self.flow.run.reader(messages)?).own(own, path, self.allow_loss)
     }
 }

@@ -6,7 +6,9 @@ use crate::values::Ansatz;
 
 impl InpaintOptions {
     pub fn check(&mut self) -> Result<()> {
-        let mask = self.mask()?;
+        let Some(mask) = &self.mask else {
+            refuse!("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r");
+        };
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
             self.mask = Some(absolute.to_string_lossy().into_owned());
@@ -16,7 +18,7 @@ impl InpaintOptions {
 
     pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
         let loaded = self.flow.run.reader(messages)?.load()?;
-        let mask = self.mask()?;
+        let mask = self.mask.as_deref().unwrap_or_default();
         Ok(match loaded {
             Loaded::Plane(mut start) => {
                 let shape = if Region::is_meant(mask) {
@@ -28,12 +30,6 @@ impl InpaintOptions {
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
             Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
-        })
-    }
-
-    fn mask(&self) -> Result<&str> {
-        self.mask.as_deref().ok_or_else(|| {
-            Error::options("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r")
         })
     }
 
@@ -50,7 +46,7 @@ impl InpaintOptions {
         if !region.contains(&true) {
             refuse!(
                 "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
-                self.mask()?,
+                self.mask.as_deref().unwrap_or_default(),
                 grid.origin(),
                 grid.side()
             );

@@ -1,12 +1,10 @@
-//! The subcommands, each in the module of its name.
+//! The subcommands, each in the module of its name, and those that say something of the program in one.
 
+pub mod about;
 pub mod check;
 pub mod fair;
 pub mod flow;
-pub mod info;
 pub mod inpaint;
-pub mod networks;
 pub mod resume;
 pub mod sample;
-pub mod shell;
 pub mod train;

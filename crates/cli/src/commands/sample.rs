@@ -14,13 +14,14 @@ const EPS_OVER_H: f64 = 2.0;
 /// Writes an input as the flows begin with it, possibly damaged.
 pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     let path = options.save.clone();
-    if let Some(labels) = volume::all_labels(&options.input)? {
-        return volume::for_each(labels, messages, |label| {
-            let mut one = options.clone();
-            one.input.label = Some(Label::One(label));
-            one.save = volume::named(&path, label);
-            run(one, messages)
-        });
+    let of_label = |label| {
+        let mut one = options.clone();
+        one.input.label = Some(Label::One(label));
+        one.save = volume::named(&path, label);
+        run(one, messages)
+    };
+    if volume::with_each_label(&options.input, messages, of_label)? {
+        return Ok(());
     }
     let format = extension(&path);
     let is_mesh = MESHES.contains(&&*format);
@@ -28,7 +29,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*format) {
         refuse!("--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz");
     }
-    options.force.check("--save", &path)?;
+    options.force.check(&path)?;
     let noise = options.noise;
     if !(noise.is_finite() && noise >= 0.0) {
         refuse!("--noise {noise} must not be negative");

@@ -3,9 +3,9 @@ use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
 
+use crate::case::check_eps_over_h;
 use crate::cli::{MessageOptions, TrainOptions};
 use crate::prelude::*;
-use crate::setup::check_eps_over_h;
 
 /// Cells per unit length of the training grid for `eps = 2h`; it grows with the interface, so that the same spheres fit.
 const CELLS: f64 = 128.0;
@@ -30,7 +30,7 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     };
     ratios.validate()?;
     let save = options.save.as_ref().ok_or_else(|| missing("save"))?;
-    options.force.check("--save", save)?;
+    options.force.check(save)?;
     let device = options.common.open_device()?;
     let mut data = SphereData::new(ratios, (CELLS * eps_over_h / 2.0).round() as usize)?;
     if options.quick {

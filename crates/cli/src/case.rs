@@ -1,0 +1,301 @@
+//! From options to cases: which device and operator, which time steps, which sizes are held, and when it ends.
+
+use engine::{ErrorControl, Flow, Held, Helfrich, Operator, Storage, Target, TimeSteps};
+use model::{Network, Networks};
+use solver::NewtonParams;
+
+use crate::cli::{
+    CommonOptions, FlowOptions, MessageOptions, RunCommand, RunOptions, SchemeOptions,
+};
+use crate::input::{Start, usual_box};
+use crate::paths::absolute;
+use crate::prelude::*;
+use crate::presentation::Presentation;
+use crate::values::{Amount, SizeTarget};
+
+/// In a step the interface moves by at most so many widths of it.
+const LONGEST_MOVE: f64 = 2.0;
+/// The usual step of inpainting in units of the inner one,
+const INPAINT_STEP: f64 = 16.0;
+/// which a ramp reaches that starts this many times halved: at the border of the region there is a jump.
+const INPAINT_HALVINGS: u32 = 12;
+/// Steps over which sizes go to their targets.
+const RAMP: usize = 20;
+/// Most steps in which edges become round, of `eps^4` each.
+const ROUNDING: usize = 8;
+/// Edges are round where the [spread](ZeroSet::spread) is below this.
+const ROUND: f64 = 0.04;
+/// Round edges take at most this part of the area away.
+const LOST: f64 = 0.15;
+
+/// Refuses widths of the interface, in cells, that no grid resolves.
+pub fn check_eps_over_h(eps_over_h: f64) -> Result<()> {
+    if !(0.5..=64.0).contains(&eps_over_h) {
+        refuse!(
+            "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
+        );
+    }
+    Ok(())
+}
+
+impl CommonOptions {
+    /// Opens the device and notes its name.
+    pub fn open_device(&mut self) -> Result<ComputeDevice> {
+        let device = ComputeDevice::named(self.device.as_deref())?;
+        self.device = Some(device.kind().name().to_owned());
+        Ok(device)
+    }
+}
+
+impl SchemeOptions {
+    /// Interface width in cells.
+    pub fn eps_over_h(&self) -> f64 {
+        self.eps_over_h.unwrap_or(2.0)
+    }
+
+    /// Takes the width of the interface from the network, unless it is given.
+    pub fn fill_in(&mut self) -> Result<()> {
+        if let Some(network) = &mut self.network {
+            *network = absolute(&*network)?;
+        }
+        if let (None, Some(path)) = (self.eps_over_h, &self.network) {
+            self.eps_over_h = Some(Network::load(path)?.ratios().eps_over_h);
+        }
+        self.eps_over_h = Some(self.eps_over_h());
+        check_eps_over_h(self.eps_over_h())
+    }
+
+    /// The step of mean curvature flow on a grid.
+    pub fn operator<const D: usize>(
+        &self,
+        method: Method,
+        grid: &Grid<D>,
+    ) -> Result<(Scales, Operator)> {
+        let scales = Scales::of_grid(grid.spacing(), self.eps_over_h());
+        let needed = scales.needs(D, grid.spacing());
+        let networks = Networks::load(self.network.as_slice(), &[needed])?;
+        let scheme = if method.is_learned() {
+            self.scheme
+        } else {
+            Scheme::Paper
+        };
+        let mut operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+        operator.storage = self.storage.unwrap_or(Storage::Auto);
+        Ok((scales, operator))
+    }
+}
+
+impl RunCommand {
+    /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
+    pub fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
+        match self {
+            Self::Fair(fair) if fair.takes_small_steps() => StepRule::Graded {
+                first: Fairing::first_step(spacing),
+                part: Fairing::GROWTH,
+            },
+            Self::Inpaint(_) => StepRule::Ramp {
+                tau: INPAINT_STEP * inner,
+                halvings: INPAINT_HALVINGS,
+            },
+            _ => StepRule::Controlled,
+        }
+    }
+
+    /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
+    pub fn usual_steps(&mut self) -> usize {
+        let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
+        match self {
+            _ if !has_an_end => 20,
+            Self::Mcf(_) => 100_000,
+            _ => 1000,
+        }
+    }
+
+    fn stops(&mut self, rule: StepRule) -> Vec<Stop> {
+        // What has gone wrong is said before what was asked for.
+        let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
+        let options = self.options();
+        stops.extend(options.steps.map(Stop::Steps));
+        stops.extend(options.time.map(Stop::Time));
+        let energy = self.willmore().and_then(|flow| flow.energy);
+        stops.extend(energy.map(Stop::Energy));
+        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
+            stops.push(Stop::EnergyAtRest);
+        }
+        if let Self::Fair(fair) = self {
+            stops.extend(fair.energy_ratio.map(Stop::EnergyRatio));
+        }
+        stops
+    }
+
+    /// The flow from a start, and how that is shown; the rule for the time steps is filled in.
+    pub fn case<const D: usize, O: Presentation<D>>(
+        &mut self,
+        start: Start<D, O>,
+    ) -> Result<(Case<D>, O)> {
+        let (flow, method) = match self {
+            Self::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
+            _ => (Flow::Willmore, Method::Hybrid),
+        };
+        let grid = *start.initial.grid();
+        let RunOptions { scheme, input, .. } = self.options();
+        let (mut scales, operator) = scheme.operator(method, &grid)?;
+        // The length that a unit of the usual box has: time steps that follow from the inner step do so in a box of that size.
+        let unit = grid.side() / input.box_side.unwrap_or(usual_box::<D>().1);
+        let inner = scales.mcf_step * unit.powi(2);
+        let usual = self.usual_rule(inner, grid.spacing());
+        let rule = match self.willmore() {
+            Some(flow) => *flow.tau.insert(flow.tau.unwrap_or(usual).resolved(inner)),
+            None => StepRule::Constant(scales.mcf_step),
+        };
+        let stops = self.stops(rule);
+        let options = self.willmore().map(|options| &*options);
+        let steps = match rule {
+            StepRule::Controlled => {
+                scales.newton = NewtonParams {
+                    precision: scales.newton.precision,
+                    ..NewtonParams::second_order()
+                };
+                let mut control = ErrorControl::default();
+                match options.and_then(|options| options.tolerance) {
+                    Some(Amount::Value(length)) => control.length = Some(length),
+                    Some(Amount::Percent(percent)) => control.relative = percent / 100.0,
+                    None => (),
+                }
+                // On coarse grids the usual first step is long against the shape.
+                control.first = Some((inner / 16.0).min(16.0 * scales.eps.powi(4)));
+                TimeSteps::controlled(control)
+            }
+            rule => TimeSteps {
+                longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
+                ..rule.into()
+            },
+        };
+        let eps = scales.eps;
+        let known = start.presentation.known(&start.initial, eps)?;
+        let (mut energy, mut held) = (Helfrich::default(), Held::default());
+        if let Some(options) = options {
+            energy.spontaneous_curvature = options.spontaneous_curvature.unwrap_or(0.0);
+            energy.tension = options.tension.unwrap_or(0.0);
+            energy.pressure = options.pressure.unwrap_or(0.0);
+            held = options.held(&start.initial, eps, known.volume)?;
+        }
+        let mut measures = vec![Measure::zero_set(eps, &held)];
+        measures.extend(known.measures);
+        let case = Case {
+            shape: start.name,
+            initial: start.initial,
+            region: start.region,
+            energy,
+            held,
+            flow,
+            operator,
+            scales,
+            steps,
+            stops: [stops, known.stops].concat(),
+            measures,
+        };
+        Ok((case, start.presentation))
+    }
+}
+
+impl FlowOptions {
+    /// The sizes that are held, from what they are at the beginning; `of_input` is the volume of the input, if the grid does not say it.
+    pub fn held<const D: usize>(
+        &self,
+        initial: &Stored<D>,
+        eps: f64,
+        of_input: Option<f64>,
+    ) -> Result<Held> {
+        let ramp = self.ramp.unwrap_or(RAMP);
+        if let Some(target) = self.reduced_volume {
+            return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
+        }
+        if self.volume.is_none() && self.area.is_none() {
+            return Ok(Held::default());
+        }
+        let now = ZeroSet::of(initial, eps)?;
+        let target = |wanted: Option<SizeTarget>, from: f64, of_input: f64| {
+            wanted.map(|wanted| match wanted {
+                SizeTarget::Keep => Target::keep(of_input),
+                SizeTarget::To(amount) => Target {
+                    from,
+                    to: amount.of(of_input),
+                    over: ramp,
+                },
+            })
+        };
+        Ok(Held {
+            perimeter: target(self.area, now.perimeter, now.perimeter),
+            volume: target(self.volume, now.volume, of_input.unwrap_or(now.volume)),
+        })
+    }
+}
+
+/// Gives the start of a flow that holds the area round edges, if its edges are sharper than the interface is wide.
+///
+/// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
+/// round while the volume alone is held, if that is, and the area goes back to what it was, or to its target, over the steps of the ramp: the
+/// options say so then.
+///
+/// # Errors
+/// With the volume held, where that does not help, or takes too much away, since the shape is too thin.
+pub fn round_edges<const D: usize>(
+    options: &mut FlowOptions,
+    start: &mut Stored<D>,
+    device: &ComputeDevice,
+    messages: MessageOptions,
+) -> Result<()> {
+    if options.area.is_none() && options.reduced_volume.is_none() {
+        return Ok(());
+    }
+    let holds_volume = options.volume.is_some() || options.reduced_volume.is_some();
+    let (scales, operator) = options.run.scheme.operator(Method::Hybrid, start.grid())?;
+    let eps = scales.eps;
+    let sharp = ZeroSet::of(start, eps)?;
+    if sharp.sizes_hold() {
+        return Ok(());
+    }
+    let targets = options.held(start, eps, None)?.targets();
+    let steps = (StepRule::Constant(eps.powi(4)), ROUNDING);
+    let case = Case {
+        held: Held {
+            perimeter: None,
+            volume: holds_volume.then(|| Target::keep(sharp.volume)),
+        },
+        measures: Vec::new(),
+        ..Case::willmore("edges", start.clone(), operator, scales, steps)
+    };
+    let mut run = Run::new(case, device)?;
+    while run.step()?.is_some() {
+        let round = ZeroSet::of(&run.current(), eps)?;
+        if round.perimeter < (1.0 - LOST) * sharp.perimeter {
+            break;
+        }
+        if round.spread > ROUND {
+            continue;
+        }
+        let of_surface = if D == 2 { "length" } else { "area" };
+        let area = targets.perimeter.unwrap_or(sharp.perimeter);
+        messages.note(&format!(
+            "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
+            round.perimeter, sharp.perimeter
+        ));
+        options.area = Some(SizeTarget::To(Amount::Value(area)));
+        if options.reduced_volume.take().is_some() {
+            let volume = targets.volume.unwrap_or(sharp.volume);
+            options.volume = Some(SizeTarget::To(Amount::Value(volume)));
+        }
+        start.clone_from(run.stored());
+        return Ok(());
+    }
+    if holds_volume {
+        refuse!(
+            "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
+             one of them",
+        );
+    }
+    Ok(())
+}
