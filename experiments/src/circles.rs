@@ -1,7 +1,6 @@
 //! Circles under mean curvature flow and Willmore flow, compared with the exact solutions
 //! (eq:analyticSolutionMCFCircle and `R(t) = (r^4 + 2t)^(1/4)`).
 
-use geometry::Error as GeometryError;
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use runs::Interrupt;
 
@@ -27,22 +26,15 @@ pub fn radii(count: usize) -> Vec<f64> {
     chosen.map(radius).collect()
 }
 
-/// Cells per side of the smallest suitable box for a circle: the interface stays 0.3 away from the boundary, and the
-/// number is even and a product of 2, 3 and 5, good for Fourier transforms.
-pub fn box_cells(flow: Flow, radius: f64, steps: usize, cells_per_unit: usize) -> usize {
-    let last = radius_at(flow, radius, steps as f64 * STEP);
-    let side = 2.0 * (radius.max(last) + MARGIN);
-    let mut cells = (side * cells_per_unit as f64).ceil() as usize;
+/// The smallest suitable box about the centre of a circle: the interface stays 0.3 away from the boundary, and the number of cells per
+/// side is even and a product of 2, 3 and 5, good for Fourier transforms.
+pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>> {
+    let side = 2.0 * (radius.max(radius_at(flow, radius, time(steps))) + MARGIN);
+    let mut cells = (side * n as f64).ceil() as usize;
     cells += cells % 2;
     while !is_smooth(cells) {
         cells += 2;
     }
-    cells
-}
-
-/// That box about the centre of the circle.
-pub fn grid(flow: Flow, radius: f64, steps: usize, n: usize) -> Result<Grid<2>> {
-    let cells = box_cells(flow, radius, steps, n);
     Ok(Grid::centred(cells, cells as f64 / n as f64)?)
 }
 
@@ -56,7 +48,7 @@ fn is_smooth(mut number: usize) -> bool {
 }
 
 /// The phase field of a circle that had this radius at `t = 0`.
-fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, GeometryError> {
+fn exact(flow: Flow, radius: f64, grid: Grid<2>, time: f64) -> Result<Field<2>, geometry::Error> {
     let radius = radius_at(flow, radius, time);
     if radius <= 0.0 {
         return Ok(Field::constant(grid, -1.0));
@@ -100,17 +92,15 @@ impl Ensemble {
             let (radius, grid) = (radii[i], grid(flow, radii[i], steps, n)?);
             let exact = move |grid, time| exact(flow, radius, grid, time);
             let shape = format!("circle r = {radius:.4}");
-            let (initial, time) = (exact(grid, 0.0)?, (STEP, steps));
-            let mut case = planar_flow((flow, operator), &shape, initial, time);
+            let (initial, last) = (exact(grid, 0.0)?, exact(grid, time(steps))?);
+            let mut case = planar_flow((flow, operator), &shape, initial, (STEP, steps));
             case.measures = Measure::size(EPS);
             case.measures.push(Measure::distance_to(exact));
-            let operator = operator.key();
-            let name = format!("{flow}-n{n}-{operator}-{i:02}");
+            let name = format!("{flow}-n{n}-{}-{i:02}", operator.key());
             let folder = folder.as_path().join(name);
             let (ends, never) = (Samples::every(usize::MAX), Interrupt::never());
             let trajectory = Trajectory::of(case, device, &folder, &ends, &mut [], &never)?;
             let trajectory = trajectory.expect("nobody interrupts it");
-            let last = exact(grid, steps as f64 * STEP)?;
             stage.bar.inc(1);
             Ok(Circle {
                 radius,
@@ -170,8 +160,8 @@ mod tests {
         for n in [128, 256, 512] {
             for r in radii(COUNT) {
                 for flow in Flow::ALL {
-                    let cells = box_cells(flow, r, STEPS, n);
-                    let last = radius_at(flow, r, STEPS as f64 * STEP);
+                    let cells = grid(flow, r, STEPS, n).unwrap().cells();
+                    let last = radius_at(flow, r, time(STEPS));
                     let gap = 0.5 * cells as f64 / n as f64 - r.max(last);
                     assert!((MARGIN..MARGIN + 0.15).contains(&gap), "{gap}");
                     assert!(cells.is_multiple_of(2) && is_smooth(cells));

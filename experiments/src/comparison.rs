@@ -1,6 +1,5 @@
 //! A shape by all methods and resolutions, against a finer run as in the paper, and against the exact flow.
 
-use clap::{CommandFactory, FromArgMatches};
 use geometry::measure::perimeter;
 use report::superscript;
 
@@ -78,12 +77,9 @@ struct Options {
 }
 
 pub fn main(setting: &Setting) -> ExitCode {
-    let command = Options::command()
-        .name(setting.program)
-        .about(setting.about);
-    let matches = command.get_matches();
-    let options = Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    harness::run(|| run(setting, &options))
+    harness::named(setting.program, setting.about, |options| {
+        run(setting, options)
+    })
 }
 
 const MEASURES: [&str; 4] = ["tip", "diagonal", "perimeter", "area"];
@@ -137,28 +133,22 @@ fn run(setting: &Setting, options: &Options) -> Result<()> {
         "eps": EPS, "time_step": STEP, "steps": steps, "networks": study.checksums(),
     });
     let mut session = Session::open(setting.program, &options.study.run, parameters)?;
-    let mut runs = Vec::new();
-    for (variant, operator) in &study.plan {
-        runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1))?);
-    }
+    let marks: Vec<_> = sampled(steps).skip(1).map(|k| (k, time(k))).collect();
+    let exact = session.phase("the exact flow", |_| setting.sample.exact(flow, &marks))?;
     let half = reference_n / 2;
     let halved = (reference_n.is_multiple_of(2) && finest <= half).then_some(half);
     let mut references: Vec<Compared> = Vec::new();
     for n in [Some(reference_n), halved].into_iter().flatten() {
         let what = ["reference: ", "for the reference's error: "][references.len()];
-        let variant = Variant::new(flow, ELEMENTS, n);
         let operator = study.networks.operator(ELEMENTS, n)?;
-        let time = (steps, setting.reference_ratio);
-        references.push(setting.run(&mut session, what, (variant, &operator), time)?);
+        let run = (Variant::new(flow, ELEMENTS, n), &operator);
+        let (time, to) = ((steps, setting.reference_ratio), references.first());
+        let run = setting.run(&mut session, what, run, time, (to, &exact))?;
+        references.push(run);
     }
-    let (reference, half) = references.split_at_mut(1);
-    for run in runs.iter_mut().chain(half) {
-        run.compare(&reference[0], steps)?;
-    }
-    let marks: Vec<_> = sampled(steps).skip(1).map(|k| (k, time(k))).collect();
-    let exact = session.phase("the exact flow", |_| setting.sample.exact(flow, &marks))?;
-    for run in runs.iter_mut().chain(&mut references) {
-        run.compare_with_exact(setting, &exact)?;
+    let (mut runs, to) = (Vec::new(), (references.first(), &exact[..]));
+    for (variant, operator) in &study.plan {
+        runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1), to)?);
     }
     let mut second_order = Vec::new();
     if flow == Flow::Willmore {
@@ -186,12 +176,14 @@ fn run(setting: &Setting, options: &Options) -> Result<()> {
 }
 
 impl Setting {
+    /// A run that is compared with a reference, unless it is the same one, and with the exact flow.
     fn run(
         &self,
         session: &mut Session,
         what: &str,
         (variant, operator): (Variant, &Operator),
         (steps, ratio): (usize, usize),
+        (reference, exact): (Option<&Compared>, &[Truth]),
     ) -> Result<Compared> {
         let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
         let initial = (self.sample.initial)(grid, EPS)?;
@@ -205,12 +197,25 @@ impl Setting {
         let title = format!("{what}{}, n = {}", variant.label(), variant.n);
         let name = format!("{}-{ratio}", variant.key());
         let trajectory = session.trajectory(&title, case, &name, &samples(ratio))?;
+        let (mut errors, mut from_exact) = (BTreeMap::new(), BTreeMap::new());
+        if let Some(reference) = reference
+            && (reference.variant, reference.ratio) != (variant, ratio)
+        {
+            for k in sampled(steps) {
+                let (own, its) = (k * ratio, k * reference.ratio);
+                errors.insert(k, trajectory.distance(own, &reference.trajectory, its)?);
+            }
+        }
+        for Truth { mark, outline, .. } in exact {
+            let points = (self.sample.level)(&trajectory.field(mark * ratio)?, EPS)?;
+            from_exact.insert(*mark, outline.largest_distance_of(&points));
+        }
         Ok(Compared {
             variant,
             trajectory,
             ratio,
-            errors: BTreeMap::new(),
-            from_exact: BTreeMap::new(),
+            errors,
+            from_exact,
         })
     }
 }
@@ -228,31 +233,9 @@ fn sampled(steps: usize) -> impl Iterator<Item = usize> {
 }
 
 impl Compared {
-    fn compare(&mut self, reference: &Self, steps: usize) -> Result<()> {
-        if (self.variant, self.ratio) == (reference.variant, reference.ratio) {
-            return Ok(());
-        }
-        for k in sampled(steps) {
-            let (own, its) = (k * self.ratio, k * reference.ratio);
-            let l2 = (self.trajectory).distance(own, &reference.trajectory, its)?;
-            self.errors.insert(k, l2);
-        }
-        Ok(())
-    }
-
-    fn compare_with_exact(&mut self, setting: &Setting, exact: &[Truth]) -> Result<()> {
-        for Truth { mark, outline, .. } in exact {
-            let field = self.trajectory.field(mark * self.ratio)?;
-            let points = (setting.sample.level)(&field, EPS)?;
-            let distance = outline.largest_distance_of(&points);
-            self.from_exact.insert(*mark, distance);
-        }
-        Ok(())
-    }
-
     fn loops(&self, step: usize) -> Result<Curve> {
         let field = self.trajectory.field(step * self.ratio)?;
-        Ok(look::outline(&field))
+        Ok(study::outline(&field))
     }
 }
 
@@ -323,7 +306,7 @@ impl Comparison<'_> {
         session.csv(errors, "errors")?;
         let compared = self.runs.iter().map(|run| (run, "false"));
         let all = compared.chain(self.references.iter().map(|run| (run, "true")));
-        let steps = all.flat_map(|run| steps::with_start(run, &run.0.trajectory));
+        let steps = all.flat_map(|run| steps::of(run, &run.0.trajectory));
         let steps: Vec<_> = steps.collect();
         let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0.variant)
             .data("reference", |step| step.run.1);
@@ -334,9 +317,8 @@ impl Comparison<'_> {
         let chart = |title, y, distances: fn(&Compared) -> &BTreeMap<usize, f64>| {
             let compared = self.runs.iter().filter(|run| !distances(run).is_empty());
             let curves = compared.map(|run| {
-                let points = distances(run)
-                    .iter()
-                    .map(|(&k, &distance)| [time(k), distance]);
+                let points = distances(run).iter();
+                let points = points.map(|(&k, &distance)| [time(k), distance]);
                 self.study.series(run.variant, points.collect())
             });
             let chart = LineChart::new(title, Axis::linear("time t"), Axis::log(y));
@@ -362,7 +344,7 @@ impl Comparison<'_> {
     /// Rows: methods at their finest resolution, and the reference; columns: times.
     fn shape_figure(&self) -> Result<Figure> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
-        for shown in look::variants() {
+        for shown in study::looks() {
             let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();
             if let Some(run) = self.runs.iter().filter(own).max_by_key(|run| run.variant.n) {
                 rows.push((run, run.variant.label().replace(", ", "\n")));

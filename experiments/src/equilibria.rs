@@ -89,42 +89,40 @@ impl Equilibrium {
     pub fn relax<const D: usize>(
         self,
         session: &mut Session,
-        mut case: Case<D>,
+        (shape, initial): (&str, Field<D>),
+        (operator, mut scales): (Operator, Scales),
         steps: Option<usize>,
     ) -> Result<AtRest<D>> {
-        let eps = case.scales.eps;
-        let start = ZeroSet::of(&case.initial, eps)?;
+        let (initial, eps) = (Stored::from(initial), scales.eps);
+        let start = ZeroSet::of(&initial, eps)?;
         let [perimeter, volume] = self.sizes::<D>();
         let over = RAMP;
         let ramp = |from, to| Some(Target { from, to, over });
-        case.held = Held {
-            perimeter: ramp(start.perimeter, perimeter),
-            volume: ramp(start.volume, volume),
-        };
         // In long steps flat vesicles and cups break through in the middle.
         let flat = self.branch.is_some_and(|branch| branch != Branch::Prolate);
-        case.steps = TimeSteps {
+        let time_steps = TimeSteps {
             longest_move: Some(if flat { 0.3 } else { 1.0 }),
             ..StepRule::ByEnergy(None).into()
         };
         // Steps that succeed take about four Newton steps. With the usual limit a step that is too long takes minutes until it is halved.
-        case.scales.newton.newton_iterations = 15;
-        case.stops = vec![
-            Stop::Steps(steps.unwrap_or(MOST)),
-            Stop::EnergyAtRest,
-            Stop::NoSurface,
-            Stop::AtTheSide,
-        ];
+        scales.newton.newton_iterations = 15;
+        let time = (time_steps, steps.unwrap_or(MOST));
+        let mut case = Case::willmore(shape, initial, operator, scales, time);
+        case.held = Held {
+            perimeter: ramp(start.perimeter, perimeter),
+            volume: ramp(start.volume, volume),
+        };
+        let ends = [Stop::EnergyAtRest, Stop::NoSurface, Stop::AtTheSide];
+        case.stops.extend(ends);
         case.measures = vec![Measure::zero_set(eps, &case.held)];
         let samples = Samples::every(usize::MAX);
         let trajectory = session.trajectory(&self.title, case, &self.key, &samples)?;
         let field = trajectory.field(trajectory.steps())?;
-        let zero_set = ZeroSet::of(&field, eps)?;
         Ok(AtRest {
             equilibrium: self,
             trajectory,
+            willmore_energy: ZeroSet::of(&field, eps)?.willmore_energy,
             field,
-            zero_set,
         })
     }
 }
@@ -150,7 +148,7 @@ pub struct AtRest<const D: usize> {
     pub equilibrium: Equilibrium,
     pub trajectory: Trajectory<D>,
     pub field: Field<D>,
-    pub zero_set: ZeroSet,
+    willmore_energy: f64,
 }
 
 impl<const D: usize> AtRest<D> {
@@ -163,7 +161,7 @@ impl<const D: usize> AtRest<D> {
     }
 
     pub fn energy(&self) -> f64 {
-        self.zero_set.willmore_energy / self.unit()
+        self.willmore_energy / self.unit()
     }
 
     pub fn exact_energy(&self) -> f64 {
@@ -175,7 +173,7 @@ impl<const D: usize> AtRest<D> {
         let half = radii * self.equilibrium.radius;
         let exact = self.equilibrium.outline();
         Shapes::new(caption, [[-half, half]; 2])
-            .with_curve(look::outline(plane).filled(Colour::LightGrey))
+            .with_curve(study::outline(plane).filled(Colour::LightGrey))
             .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0))
     }
 
@@ -191,8 +189,9 @@ impl<const D: usize> AtRest<D> {
     }
 
     fn last(&self, of: fn(&StepRecord) -> Option<f64>) -> Option<f64> {
-        let records = self.trajectory.records.iter().rev();
-        records.filter_map(|r| r.minimization.as_ref()).find_map(of)
+        minimizations(&self.trajectory.records)
+            .filter_map(of)
+            .last()
     }
 }
 
@@ -202,7 +201,7 @@ pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
         2 => ("w_over_circle", "energy / circle's", ["length", "area"]),
         _ => ("w_over_8pi", "energy / ball's", ["area", "volume"]),
     };
-    let error = |one: &AtRest<D>| one.zero_set.willmore_energy / one.equilibrium.energy - 1.0;
+    let error = |one: &AtRest<D>| one.willmore_energy / one.equilibrium.energy - 1.0;
     let (energies, forces) = (Fixed(4), Fixed(3));
     let mut sheet = Sheet::of(all)
         .keyed(|one, name| format!("{}.{name}", one.equilibrium.key))

@@ -1,14 +1,9 @@
 //! The outermost layer of every program, and running many independent tasks.
 
-use std::collections::BTreeMap;
-use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use clap::Parser;
-use operators::{ComputeDevice, memory};
-
-use crate::{Error, Result};
+use crate::prelude::*;
 
 /// Runs a program with the options of the command line.
 pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<()>) -> ExitCode {
@@ -16,13 +11,24 @@ pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<()>) -> ExitCode {
     run(|| program(&options))
 }
 
+/// The same for a program of this name with this help, whose options others have, too.
+pub fn named<O: Parser>(
+    name: &'static str,
+    about: &'static str,
+    program: impl FnOnce(&O) -> Result<()>,
+) -> ExitCode {
+    let matches = O::command().name(name).about(about).get_matches();
+    let options = O::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    run(|| program(&options))
+}
+
 /// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
-pub fn run(program: impl FnOnce() -> Result<()>) -> ExitCode {
+fn run(program: impl FnOnce() -> Result<()>) -> ExitCode {
     memory::keep_freed();
     match program() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", files::with_causes(&error));
+            eprintln!("error: {}", files::with_causes(&*error));
             ExitCode::from(2)
         }
     }
@@ -66,7 +72,7 @@ pub fn in_parallel<R: Send>(
         let pools = (0..workers.min(count))
             .map(pool)
             .collect::<Result<Vec<_>, _>>();
-        let pools = pools.map_err(|e| Error::Options(format!("cannot start threads: {e}")))?;
+        let pools = pools.map_err(|e| format!("cannot start threads: {e}"))?;
         std::thread::scope(|scope| {
             for pool in &pools {
                 scope.spawn(|| pool.install(work));
@@ -93,7 +99,7 @@ mod tests {
         let error = in_parallel(1000, 2, |i| {
             started.fetch_add(1, Ordering::Relaxed);
             if i == 996 {
-                return Err(Error::Options("task 996".to_owned()));
+                return Err("task 996".into());
             }
             std::thread::sleep(std::time::Duration::from_millis(2));
             Ok(i)

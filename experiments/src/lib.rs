@@ -4,17 +4,6 @@
 //! executables only call them. Numerics live in the library crates; the only computation here is the comparison with
 //! exact solutions.
 //!
-//! ```
-//! use engine::Flow;
-//! use experiments::circles;
-//!
-//! // The paper's circles live on boxes just large enough that the phase field's tails do not matter.
-//! let radii = circles::radii(circles::COUNT);
-//! let smallest = circles::box_cells(Flow::MeanCurvature, radii[0], 64, 128);
-//! let largest = circles::box_cells(Flow::Willmore, radii[29], 64, 128);
-//! assert!(smallest < largest && largest < 256);
-//! ```
-//!
 //! # Conventions
 //!
 //! - `n` is the number of cells per unit length, `h = 1/n`.
@@ -28,10 +17,8 @@
 pub mod circles;
 pub mod comparison;
 pub mod equilibria;
-mod error;
 pub mod harness;
 pub mod inpainting;
-pub mod look;
 pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;
@@ -39,7 +26,6 @@ pub mod options;
 pub mod prelude;
 pub mod products;
 pub mod programs;
-pub mod quality;
 pub mod session;
 pub mod smoothing;
 pub mod steps;
@@ -50,4 +36,13 @@ pub mod timing;
 pub mod training;
 pub mod truth;
 
-pub use error::{Error, Result, require};
+/// What stops an experiment: options that contradict each other or the experiment, or an error of a library.
+pub type Error = Box<dyn std::error::Error + Send + Sync>;
+
+/// What can fail as an experiment does, unless it says otherwise.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Refuses options with this message unless the condition holds.
+pub fn require(holds: bool, message: impl Into<Error>) -> Result<()> {
+    holds.then_some(()).ok_or_else(|| message.into())
+}

@@ -6,8 +6,7 @@ use geometry::{PURE_BEYOND, npy};
 use crate::prelude::*;
 
 /// Names a folder that holds the meshes of the paper.
-pub const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
-const FOLDER: &str = "meshes";
+const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
 
 /// Options of programs that start from a mesh.
 #[derive(Args, Clone, Debug, Default)]
@@ -115,7 +114,18 @@ impl MeshOptions {
             let about = json!({ "built_in": title });
             ((known.procedural)(PROCEDURAL_CELLS)?, title, about)
         } else {
-            self.read(known)?
+            let path = self.find(known).ok_or_else(|| {
+                format!(
+                    "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
+                     or try the built-in shape with --procedural",
+                    known.file
+                )
+            })?;
+            let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
+            let (name, mut about) = about_file(&path)?;
+            about["warnings"] = warnings.iter().map(ToString::to_string).collect();
+            let papers = self.mesh.is_none().then(|| known.title.to_owned());
+            (mesh, papers.unwrap_or(name), about)
         };
         let side_length = self.side_length.unwrap_or(known.side_length);
         let placement = Placement::fit(&mesh.bounding_box(), grid, side_length)?;
@@ -129,23 +139,6 @@ impl MeshOptions {
             about,
             is_papers: self.mesh.is_none() && !self.procedural,
         })
-    }
-
-    fn read(&self, known: &KnownMesh) -> Result<(ClosedMesh, String, Value)> {
-        let path = self.find(known).ok_or_else(|| {
-            Error::Options(format!(
-                "{} is not here: run scripts/fetch_meshes, or set {FOLDER_VARIABLE} to a folder that holds it, or give --mesh FILE, \
-                 or try the built-in shape with --procedural",
-                known.file
-            ))
-        })?;
-        let (mesh, warnings) = ClosedMesh::new(surfaces::read(&path)?)?;
-        let (mut title, mut about) = about_file(&path)?;
-        about["warnings"] = warnings.iter().map(ToString::to_string).collect();
-        if self.mesh.is_none() {
-            known.title.clone_into(&mut title);
-        }
-        Ok((mesh, title, about))
     }
 
     /// The chosen mesh, or the built-in shape if none was chosen and that of the paper is not here.
@@ -164,7 +157,7 @@ impl MeshOptions {
 /// The folder that holds the meshes of the paper, if they are here.
 pub fn folder() -> PathBuf {
     let named = std::env::var_os(FOLDER_VARIABLE);
-    named.unwrap_or_else(|| FOLDER.into()).into()
+    named.unwrap_or_else(|| "meshes".into()).into()
 }
 
 fn about_file(path: &Path) -> Result<(String, Value)> {

@@ -46,10 +46,8 @@ impl RunOptions {
 
 /// Numbers from the least to the largest, each once.
 pub fn distinct(numbers: &[usize]) -> Vec<usize> {
-    let mut distinct = numbers.to_vec();
-    distinct.sort_unstable();
-    distinct.dedup();
-    distinct
+    let distinct: BTreeSet<usize> = numbers.iter().copied().collect();
+    distinct.into_iter().collect()
 }
 
 /// Options of a figure at one resolution.

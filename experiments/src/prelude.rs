@@ -37,4 +37,4 @@ pub use crate::networks::{
 pub use crate::options::{FigureOptions, RunOptions, distinct};
 pub use crate::session::{Session, Stage};
 pub use crate::study::{self, Study, StudyOptions, Variant};
-pub use crate::{Error, Result, harness, look, quality, require, steps, timing};
+pub use crate::{Error, Result, harness, require, steps, timing};

@@ -77,7 +77,7 @@ impl ByHand {
 /// of the product through Burn to that by hand in the same turn, and what the former costs `over_floor`, its transforms alone.
 ///
 /// # Errors
-/// [`Error::Options`] if the products disagree; what the solver raises.
+/// If the products disagree; what the solver raises.
 pub fn measure<const D: usize>(
     network: &Network,
     u: &Field<D>,
@@ -119,40 +119,33 @@ pub fn measure<const D: usize>(
         move || spectral_filter(spectral_filter(black_box(p.clone()), &floor), &floor)
     });
     let once = "it worked once";
+    let burn = || double.hessian_vector_product(black_box(&p)).expect(once);
+    let burn_single = || single.hessian_vector_product(&p_single).expect(once);
     let mut contenders = [
-        work("ms", || {
-            double.hessian_vector_product(black_box(&p)).expect(once)
-        }),
-        work("single_ms", || {
-            single.hessian_vector_product(&p_single).expect(once)
-        }),
-        work("by_hand_ms", || by_hand.product(black_box(&on_host))),
-        work("floor_ms", floor),
-        work("floor_single_ms", floor_single),
-        work("evaluate_ms", || evaluated.evaluate(&u).expect(once)),
+        ("ms", work(burn)),
+        ("single_ms", work(burn_single)),
+        ("by_hand_ms", work(|| by_hand.product(black_box(&on_host)))),
+        ("floor_ms", work(floor)),
+        ("floor_single_ms", work(floor_single)),
+        ("evaluate_ms", work(|| evaluated.evaluate(&u).expect(once))),
     ];
-    let clock = Instant::now();
-    let goes_on = |(.., times): &(_, _, Vec<f64>)| {
-        times.len() < LEAST || clock.elapsed().as_secs_f64() < seconds
-    };
-    timing::take_turns(&mut contenders, goes_on, |(_, work, times)| {
-        let clock = Instant::now();
-        work();
-        times.push(1e3 * clock.elapsed().as_secs_f64());
-        Ok(())
-    })?;
-    let (burn, by_hand) = (&contenders[0].2, &contenders[2].2);
-    let ratio = timing::median(burn.iter().zip(by_hand).map(|(a, b)| a / b).collect());
-    let times = contenders.map(|(name, _, times)| (name, timing::median(times)));
-    let mut numbers = Numbers::from(times);
-    numbers.insert("ratio", ratio);
+    // In turns, so that whatever else the machine does burdens all alike.
+    let (clock, mut rounds) = (Instant::now(), Vec::new());
+    while rounds.len() < LEAST || clock.elapsed().as_secs_f64() < seconds {
+        rounds.push(contenders.each_mut().map(|(_, work)| {
+            let clock = Instant::now();
+            work();
+            1e3 * clock.elapsed().as_secs_f64()
+        }));
+    }
+    let median = |of: &dyn Fn(&[f64; 6]) -> f64| timing::median(rounds.iter().map(of).collect());
+    let names = contenders.iter().map(|(name, _)| *name).enumerate();
+    let mut numbers: Numbers = names.map(|(k, name)| (name, median(&|ms| ms[k]))).collect();
+    numbers.insert("ratio", median(&|ms| ms[0] / ms[2]));
     numbers.insert("over_floor", numbers["ms"] / numbers["floor_ms"]);
     Ok(numbers)
 }
 
-/// Work with the name of its time, and its times.
-type Contender<'a> = (&'static str, Box<dyn FnMut() + 'a>, Vec<f64>);
-
-fn work<'a, R>(name: &'static str, mut of: impl FnMut() -> R + 'a) -> Contender<'a> {
-    (name, Box::new(move || drop(black_box(of()))), Vec::new())
+fn work<'a, R>(mut of: impl FnMut() -> R + 'a) -> Box<dyn FnMut() + 'a> {
+    Box::new(move || drop(black_box(of())))
 }

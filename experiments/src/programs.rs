@@ -1,6 +1,5 @@
 //! The programs: a figure of the paper each, or a study of ours, as the help of each says.
 
-pub mod armadillo;
 pub mod calibration;
 pub mod circle_convergence;
 pub mod denoising;
@@ -12,7 +11,6 @@ pub mod inpainting_3d;
 pub mod learned_networks;
 pub mod mesh_distance;
 pub mod performance;
-pub mod rocker_arm;
 pub mod spheres;
 pub mod timing_tables;
 pub mod train_networks;

@@ -51,9 +51,8 @@ impl Session {
     pub fn open(program: &str, options: &RunOptions, mut parameters: Value) -> Result<Self> {
         let device = options.open_device()?;
         parameters["quick"] = options.quick.into();
-        let folder = options.output.clone();
-        let usual = format!("{program}{}", options.either("-quick", ""));
-        let folder = folder.unwrap_or_else(|| PathBuf::from("results").join(usual));
+        let usual = format!("results/{program}{}", options.either("-quick", ""));
+        let folder = options.output.clone().unwrap_or_else(|| usual.into());
         let output = OutputDir::create(folder)?;
         let place = if device.kind().is_cpu() { "cpu" } else { "gpu" };
         let dtype = format!("{:?}", device.dtype()).to_lowercase();

@@ -16,6 +16,12 @@ pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
     (squares.sum::<f64>() / mesh.vertices.len() as f64).sqrt()
 }
 
+/// A mesh after one round of smoothing, after two, and so on.
+pub fn rounds(mesh: &TriangleMesh, [lambda, mu]: [f64; 2]) -> impl Iterator<Item = TriangleMesh> {
+    let round = move |mesh: &TriangleMesh| Some(mesh.smoothed(1, lambda, mu));
+    std::iter::successors(round(mesh), round)
+}
+
 /// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
 pub fn fairing_flow(title: &str, distance: Field<3>) -> Result<Case<3>> {
     let (distance, _) = surfaces::mend_signs(Stored::whole(distance));

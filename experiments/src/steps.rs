@@ -4,36 +4,24 @@ use engine::Values;
 
 use crate::prelude::*;
 
-/// A step of one of several runs, or its beginning.
+/// A step of one of several runs, or its beginning, which has no record.
 pub struct Step<'a, R> {
     pub run: R,
     record: Option<&'a Record>,
     measures: &'a Values,
 }
 
-/// The steps of a run.
+/// The beginning of a run and its steps.
 pub fn of<R: Copy, const D: usize>(
     run: R,
     trajectory: &Trajectory<D>,
 ) -> impl Iterator<Item = Step<'_, R>> {
-    trajectory.records.iter().map(move |record| Step {
+    let records = trajectory.records.iter().map(Some);
+    [None].into_iter().chain(records).map(move |record| Step {
         run,
-        record: Some(record),
-        measures: &record.measures,
+        record,
+        measures: record.map_or(&trajectory.start, |record| &record.measures),
     })
-}
-
-/// The beginning of a run and its steps.
-pub fn with_start<R: Copy, const D: usize>(
-    run: R,
-    trajectory: &Trajectory<D>,
-) -> impl Iterator<Item = Step<'_, R>> {
-    let start = Step {
-        run,
-        record: None,
-        measures: &trajectory.start,
-    };
-    [start].into_iter().chain(of(run, trajectory))
 }
 
 /// Writes the steps of runs by any names, with method and scheme, as `steps.csv`.
@@ -42,7 +30,7 @@ pub fn write<'a, const D: usize>(
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
 ) -> Result<()> {
-    let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run));
+    let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run).skip(1));
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)
         .text(named, |step| step.run.0)
@@ -78,7 +66,11 @@ const MINIMIZATION: [(&str, fn(&StepRecord) -> Cell); 10] = [
     ("energy_before", |m| m.energy_before.into()),
     ("energy", |m| m.energy.into()),
     ("willmore_energy", |m| m.willmore_energy.into()),
-    ("exit", exit),
+    // Why a minimization ended, as serde writes it.
+    ("exit", |m| {
+        let exit = serde_json::to_value(m.newton.exit).ok();
+        exit.as_ref().and_then(Value::as_str).into()
+    }),
     ("newton", |m| m.newton.newton.into()),
     ("hvp", |m| m.hvp().into()),
     ("values", |m| m.newton.values.into()),
@@ -86,9 +78,3 @@ const MINIMIZATION: [(&str, fn(&StepRecord) -> Cell); 10] = [
     ("negative_curvature", |m| m.newton.negative_curvature.into()),
     ("estimate", |m| m.newton.estimate.into()),
 ];
-
-/// Why a minimization ended, as serde writes it.
-fn exit(made: &StepRecord) -> Cell {
-    let exit = serde_json::to_value(made.newton.exit).ok();
-    exit.as_ref().and_then(|name| name.as_str()).into()
-}

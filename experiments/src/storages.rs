@@ -2,7 +2,7 @@
 
 use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, needed_network, scales};
+use crate::surfaces::{centred_box, scales};
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
@@ -97,9 +97,8 @@ impl StorageOptions {
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution.
     pub fn measure(&self, session: &mut Session) -> Result<Vec<Measured>> {
-        let shipped = Chosen::default();
-        let mut dense_or_bricks = shipped.learned(Scheme::Accurate, &needed_network())?;
-        let quick = session.options.quick;
+        let steps = |usual| session.options.either(QUICK_STEPS, usual);
+        let [steps, cross_steps] = [STEPS, CROSS_STEPS].map(steps);
         let [curves, surfaces] = self.cells(&session.options);
         let mut measured = Vec::new();
         let forget_memory = || {
@@ -112,13 +111,10 @@ impl StorageOptions {
             let mut scales = scales(n);
             scales.newton = NewtonParams::second_order();
             let initial = (CROSS.initial)(grid, scales.eps)?;
-            let mut operator = operator(ACCURATE, &grid, &scales)?;
-            operator.storage = Storage::Bricks;
-            let steps = TimeSteps::controlled(ErrorControl::default());
-            let time = (steps.rule, if quick { QUICK_STEPS } else { CROSS_STEPS });
-            let mut case = Case::willmore(CROSS.key, initial, operator, scales, time);
-            case.steps = steps;
-            measured.push(Measured::measure(CROSS.key, n, case, session)?);
+            let operator = operator(ACCURATE, &grid, &scales)?;
+            let time = (StepRule::Controlled, cross_steps);
+            let case = Case::willmore(CROSS.key, initial, operator, scales, time);
+            measured.push(Measured::new(CROSS.key, n, Storage::Bricks, case, session)?);
         }
         for n in surfaces {
             for storage in STORAGES {
@@ -127,17 +123,17 @@ impl StorageOptions {
                 }
                 forget_memory();
                 let (grid, mesh) = self.mesh(&session.options, n)?;
-                let (title, eps) = (mesh.title.clone(), scales(n).eps);
+                let (title, scales) = (mesh.title.clone(), scales(n));
                 let distances = format!("{title}, n = {n}, {storage}: signed distance");
-                let initial =
-                    session.phase(distances, |stage| mesh.phase_field(grid, eps, &stage.bar))?;
+                let initial = session.phase(distances, |stage| {
+                    mesh.phase_field(grid, scales.eps, &stage.bar)
+                })?;
                 drop(mesh);
-                let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
-                let time = (rule, if quick { QUICK_STEPS } else { STEPS });
-                dense_or_bricks.storage = storage;
-                let operator = dense_or_bricks.clone();
-                let case = Case::willmore(&title, initial, operator, scales(n), time);
-                measured.push(Measured::measure("armadillo", n, case, session)?);
+                let first = FIRST_STEP * grid.spacing().powi(4);
+                let time = (StepRule::Doubling(first), steps);
+                let operator = operator(ACCURATE, &grid, &scales)?;
+                let case = Case::willmore(&title, initial, operator, scales, time);
+                measured.push(Measured::new("armadillo", n, storage, case, session)?);
             }
         }
         Ok(measured)
@@ -145,15 +141,16 @@ impl StorageOptions {
 }
 
 impl Measured {
-    fn measure<const D: usize>(
+    fn new<const D: usize>(
         shape: &'static str,
         n: usize,
+        storage: Storage,
         mut case: Case<D>,
         session: &mut Session,
     ) -> Result<Self> {
         case.measures.clear();
-        let title = case.shape.clone();
-        let (storage, nodes) = (case.operator.storage, case.grid().len() as f64);
+        case.operator.storage = storage;
+        let (title, nodes) = (case.shape.clone(), case.grid().len() as f64);
         let mut run = Run::new(case, &session.device)?;
         let cells = run.stored_cells() as f64;
         let steps = format!("{title}, n = {n}, {storage}: steps");
@@ -204,9 +201,8 @@ pub fn write(stored: &[Measured], session: &mut Session) -> Result<()> {
 }
 
 fn surfaces(measured: &[Measured], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
-    let rows = measured
-        .iter()
-        .filter(move |row| row.shape != CROSS.key && row.storage == storage);
+    let is_own = move |row: &&Measured| row.shape != CROSS.key && row.storage == storage;
+    let rows = measured.iter().filter(is_own);
     rows.filter_map(move |row| Some([row.n as f64, *row.numbers.get(name)?]))
 }
 

@@ -1,4 +1,6 @@
-//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions.
+//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions, and their looks.
+
+use geometry::contour::zero_level;
 
 use crate::prelude::*;
 
@@ -99,7 +101,7 @@ impl Variant {
 
 /// What is compared with what, with all operators.
 pub struct Study {
-    pub cells: Vec<usize>,
+    pub cells: BTreeSet<usize>,
     pub plan: Vec<(Variant, Operator)>,
     pub networks: Chosen,
 }
@@ -110,17 +112,19 @@ impl Study {
         let learned = variants.iter().filter(|v| takes_networks(v.look()));
         let needs = learned.map(|v| convergence_network(v.n));
         let networks = options.load(&needs.collect::<Result<Vec<_>, _>>()?)?;
-        let cells: BTreeSet<usize> = variants.iter().map(|v| v.n).collect();
         let mut plan = Vec::new();
         for variant in variants {
             let other = || networks.find(Scheme::Accurate, &convergence_network(variant.n)?);
-            match networks.operator(variant.look(), variant.n) {
-                Err(Error::Model(model::Error::MissingNetwork { .. })) if other().is_ok() => {}
-                operator => plan.push((*variant, operator?)),
+            let operator = networks.operator(variant.look(), variant.n);
+            let error = operator.as_ref().err();
+            let error = error.and_then(|error| error.downcast_ref::<model::Error>());
+            let is_missing = matches!(error, Some(model::Error::MissingNetwork { .. }));
+            if !(is_missing && other().is_ok()) {
+                plan.push((*variant, operator?));
             }
         }
         Ok(Self {
-            cells: cells.into_iter().collect(),
+            cells: variants.iter().map(|v| v.n).collect(),
             plan,
             networks,
         })
@@ -157,7 +161,7 @@ impl Study {
     /// ones are wider and show on both sides of finer ones.
     pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
         Series::new(format!("{}, n = {}", variant.label(), variant.n), points)
-            .with_colour(look::colour(variant.method, variant.scheme))
+            .with_colour(colour(variant.method, variant.scheme))
             .with_style(self.dashes(variant.n))
             .with_width(1.8 + 1.4 * self.rank(variant.n) as f64)
     }
@@ -165,17 +169,41 @@ impl Study {
     /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
         let planned = |look: &_| self.variants().any(|variant| variant.look() == *look);
-        let methods = look::variants().filter(planned).map(|(method, scheme)| {
-            let (label, colour) = (method.label_in(scheme), look::colour(method, scheme));
+        let methods = looks().filter(planned).map(|(method, scheme)| {
+            let (label, colour) = (method.label_in(scheme), colour(method, scheme));
             LegendEntry::line(label, colour, LineStyle::Solid)
         });
-        let resolutions = self
-            .cells
-            .iter()
-            .map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
-        let chart = chart.with_curves(curves);
-        chart.with_entries(methods).with_entries(resolutions)
+        let cells = self.cells.iter();
+        let resolutions =
+            cells.map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
+        let chart = chart.with_curves(curves).with_entries(methods);
+        chart.with_entries(resolutions)
     }
+}
+
+/// The methods in their schemes, in the order of legends.
+pub fn looks() -> impl Iterator<Item = (Method, Scheme)> {
+    let schemes = |method| Scheme::ALL.map(|scheme| (method, scheme));
+    Method::ALL.into_iter().flat_map(schemes)
+}
+
+/// Colour of a method in a scheme, an entry of the palette.
+pub fn colour(method: Method, scheme: Scheme) -> usize {
+    match (method, scheme) {
+        (Method::Hybrid, Scheme::Paper) => 0,
+        (Method::Hybrid, Scheme::Calibrated) => 5,
+        (Method::Hybrid, Scheme::Accurate) => 2,
+        (Method::FeImplicit, Scheme::Paper) => 1,
+        (Method::FeImplicit, _) => 4,
+        (Method::FeSemi, Scheme::Paper) => 3,
+        (Method::FeSemi, _) => 6,
+    }
+}
+
+/// The zero level of a phase field.
+pub fn outline(field: &Field<2>) -> Curve {
+    let curves = zero_level(field).into_iter();
+    Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }
 
 /// Mean over minimizations; nothing without any.

@@ -77,21 +77,19 @@ impl Setting {
     }
 
     /// The parameters of a program for its manifest: the common ones with the networks of all operators, and others.
-    pub fn parameters(&self, others: Value) -> Result<Value> {
+    pub fn parameters(&self, mut others: Value) -> Result<Value> {
         let mut networks = BTreeMap::new();
         for &variant in &self.variants {
             if let Some(named) = self.operator(variant)?.network() {
                 networks.insert(variant.0.key_in(variant.1), named.network.fingerprint());
             }
         }
-        let mut parameters = json!({
-            "n": self.n, "box_side": self.grid.side(), "eps": self.scales.eps, "mcf_step": self.scales.mcf_step,
-            "networks": networks,
-        });
-        if let (Value::Object(all), Value::Object(others)) = (&mut parameters, others) {
-            all.extend(others);
-        }
-        Ok(parameters)
+        others["n"] = self.n.into();
+        others["box_side"] = self.grid.side().into();
+        others["eps"] = self.scales.eps.into();
+        others["mcf_step"] = self.scales.mcf_step.into();
+        others["networks"] = json!(networks);
+        Ok(others)
     }
 }
 
@@ -103,9 +101,10 @@ pub struct SchemeOptions {
 }
 
 impl SchemeOptions {
-    pub fn schemes(&self) -> Vec<Scheme> {
-        let wanted = self.scheme.map(|scheme| vec![scheme]);
-        wanted.unwrap_or_else(|| vec![Scheme::Paper, Scheme::Accurate])
+    /// The learned operator in these schemes.
+    pub fn learned(&self) -> Vec<(Method, Scheme)> {
+        let usual = vec![PAPERS, ACCURATE];
+        (self.scheme).map_or(usual, |scheme| vec![(Method::Hybrid, scheme)])
     }
 }
 

@@ -1,22 +1,7 @@
-//! Wall times, work and memory. Contenders take turns, so that whatever else the machine does burdens them alike.
+//! Wall times, work and memory.
 
 use crate::prelude::*;
 use crate::{surfaces, truth};
-
-/// Round after round, everyone who goes on has a turn.
-pub fn take_turns<C>(
-    contenders: &mut [C],
-    goes_on: impl Fn(&C) -> bool,
-    mut turn: impl FnMut(&mut C) -> Result<()>,
-) -> Result<()> {
-    loop {
-        let round: Vec<&mut C> = contenders.iter_mut().filter(|c| goes_on(c)).collect();
-        if round.is_empty() {
-            return Ok(());
-        }
-        round.into_iter().try_for_each(&mut turn)?;
-    }
-}
 
 /// The middle value; 0 for none.
 pub fn median(mut values: Vec<f64>) -> f64 {

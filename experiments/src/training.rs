@@ -1,14 +1,9 @@
-//! The networks of the experiments, and training them with a progress bar and checkpoints.
+//! The networks of the experiments: their training data, and their quality.
 
-use std::time::Duration;
-
-use model::training::{Checkpoint, Progress as Iteration, Recipe, SphereData, Trained, Training};
-use model::{Error as ModelError, Ratios};
-use serde::de::DeserializeOwned;
+use model::training::SphereData;
+use model::{Network, Quality, Ratios};
 
 use crate::prelude::*;
-
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
@@ -48,6 +43,16 @@ impl NetworkSpec {
         let data = SphereData::new(self.ratios, self.cells)?;
         Ok(if quick { data.quick() } else { data })
     }
+
+    /// The quality of a network on spheres that it was not trained on; adds the metrics.
+    pub fn measure(&self, session: &mut Session, network: &Network) -> Result<Quality> {
+        let (data, radii) = (self.data(false)?, held_out_radii(session.options.quick));
+        let quality = session.phase(format!("quality of {}", self.name), |stage| {
+            Ok(Quality::measure(network, &data, radii, stage.device)?)
+        })?;
+        session.summary.insert_record(self.name, &quality)?;
+        Ok(quality)
+    }
 }
 
 /// Training needs double precision: the same options if their device has that, else with a CPU.
@@ -56,8 +61,7 @@ pub fn in_double_precision(options: &RunOptions) -> Result<RunOptions> {
     if !options.open_device()?.kind().is_cpu() {
         let none = "training needs double precision: build with the feature `flex` or `ndarray`";
         let kind = DeviceKind::compiled().find(|kind| kind.is_cpu());
-        let kind = kind.ok_or_else(|| Error::Options(none.to_owned()))?;
-        options.device = Some(kind.name().to_owned());
+        options.device = Some(kind.ok_or(none)?.name().to_owned());
     }
     Ok(options)
 }
@@ -66,68 +70,26 @@ pub fn held_out_radii(quick: bool) -> usize {
     if quick { 4 } else { 20 }
 }
 
-/// Trains a network by a recipe [in double precision](in_double_precision), continuing from the checkpoint in a file.
-pub fn train<R: Recipe>(
-    (spec, recipe): (&NetworkSpec, &R),
-    file: &Path,
-    stage: &Stage<'_>,
-) -> Result<Trained> {
-    let training = Training {
-        recipe,
-        data: spec.data(stage.options.quick)?,
-        seed: stage.options.seed,
-        held_out: held_out_radii(stage.options.quick),
-    };
-    let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
-    let key = key.expect("settings are numbers and names");
-    let mut checkpoint: Checkpoint<R::State> = load(file, &key).unwrap_or_default();
-    let bar = &stage.bar;
-    bar.set_position(checkpoint.curve.len() as u64);
-    bar.reset_eta();
-    let mut stored = Instant::now();
-    let mut observer = |at: &Iteration, checkpoint: &Checkpoint<R::State>| {
-        bar.set_length(at.of as u64);
-        bar.set_position(at.iteration as u64);
-        bar.set_message(format!("{}  {:.2e}", spec.name, at.held_out_loss));
-        if stored.elapsed() >= CHECKPOINT_INTERVAL {
-            store(file, &key, checkpoint).map_err(|e| ModelError::Training(e.to_string()))?;
-            stored = Instant::now();
-        }
-        Ok(true)
-    };
-    let trained = training.run(&mut checkpoint, stage.device, &mut observer)?;
-    store(file, &key, &checkpoint)?;
-    Ok(trained)
-}
+const LOSS: Format = Format::Scientific(2);
+const TRANSFER: Format = Format::Fixed(5);
 
-/// What is stored in a file, if it is there, readable, and belongs to this key.
-fn load<T: DeserializeOwned>(file: &Path, key: &Value) -> Option<T> {
-    let (found, stored): (Value, T) = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
-    (found == *key).then_some(stored)
-}
+/// The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
+const QUALITY: [(&str, Format, fn(&Quality) -> f64); 10] = [
+    ("held-out loss", LOSS, |q| q.held_out_loss),
+    ("loss of -u", LOSS, |q| q.flipped_loss),
+    ("identity", LOSS, |q| q.identity_loss),
+    ("reference loss", LOSS, |q| q.reference_loss),
+    ("reference, -u", LOSS, |q| q.reference_flipped_loss),
+    ("transfer min", TRANSFER, |q| q.transfer_min),
+    ("transfer max", TRANSFER, |q| q.transfer_max),
+    ("|F(±1) ∓ 1|", LOSS, |q| q.phase_defect),
+    ("roughness of F''", LOSS, |q| q.activation_roughness),
+    ("radial asymmetry", LOSS, |q| q.radial_asymmetry),
+];
 
-/// Stores something with all that it depends on, its key, whole or not at all.
-fn store(file: &Path, key: &Value, stored: &impl Serialize) -> Result<(), files::Error> {
-    let text = serde_json::to_string(&(key, stored)).map_err(std::io::Error::from);
-    files::write_atomically(file, |out| out.write_all(text?.as_bytes()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn checkpoints_belong_to_their_keys() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("part.json");
-        let (key, values) = (json!({ "x": 0.1 + 0.2 }), vec![1.0 / 3.0, -0.0]);
-        assert_eq!(load::<Vec<f64>>(&file, &key), None);
-        store(&file, &key, &values).unwrap();
-        let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
-        assert_eq!(load(&file, &key).map(bits), Some(bits(values)));
-        assert_eq!(load::<Vec<f64>>(&file, &json!({ "x": 0.3 })), None);
-        std::fs::write(&file, "{").unwrap();
-        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+pub fn quality<'a, R>(mut sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
+    for (head, format, value) in QUALITY {
+        sheet = sheet.column(head, format, |row| value(of(row)));
     }
+    sheet
 }

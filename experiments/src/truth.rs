@@ -385,12 +385,11 @@ impl Reached {
     /// points of the finer level move on by a third of the way from the coarser one. The work is that of both.
     fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
         let size = |(name, b): (&&'static str, &f64)| (*name, (4.0 * b - double.sizes[name]) / 3.0);
-        let points: Vec<[f64; 2]> = (single.points.iter())
-            .map(|p| {
-                let [x, y] = nearest(&double.points, *p);
-                [p[0] + (p[0] - x) / 3.0, p[1] + (p[1] - y) / 3.0]
-            })
-            .collect();
+        let moved = |p: &[f64; 2]| {
+            let [x, y] = nearest(&double.points, *p);
+            [p[0] + (p[0] - x) / 3.0, p[1] + (p[1] - y) / 3.0]
+        };
+        let points: Vec<[f64; 2]> = single.points.iter().map(moved).collect();
         Self {
             mark: exact.mark,
             sizes: single.sizes.iter().map(size).collect(),

@@ -1,5 +1,5 @@
 //! A scanned figure under Willmore flow with time steps that double.
 
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::armadillo::program)
+    experiments::mesh_flow::main(&experiments::mesh_flow::ARMADILLO)
 }

@@ -25,18 +25,6 @@ pub struct Options {
     circles: Option<usize>,
 }
 
-impl Options {
-    /// All curves of the figures. Nested finite elements take hours; everything else together some minutes.
-    fn variants(&self) -> Vec<Variant> {
-        let limit = self.elements_up_to.unwrap_or(usize::MAX);
-        let usual = |method: Method, _| method.is_learned() || self.study.full;
-        let mut willmore = self.study.variants(Flow::Willmore, usual);
-        willmore.retain(|variant| variant.method.is_learned() || variant.n <= limit);
-        let mean_curvature = self.study.variants(Flow::MeanCurvature, |_, _| true);
-        [mean_curvature, willmore].concat()
-    }
-}
-
 pub fn program(options: &Options) -> Result<()> {
     let run = &options.study.run;
     let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
@@ -44,7 +32,13 @@ pub fn program(options: &Options) -> Result<()> {
     let most = circles::COUNT;
     let message = format!("--circles must be from 1 to {most}, not {count}");
     require((1..=most).contains(&count), message)?;
-    let variants = options.variants();
+    // Nested finite elements take hours; everything else together some minutes.
+    let usual = |method: Method, _| method.is_learned() || options.study.full;
+    let limit = options.elements_up_to.unwrap_or(usize::MAX);
+    let mut willmore = options.study.variants(Flow::Willmore, usual);
+    willmore.retain(|variant| variant.method.is_learned() || variant.n <= limit);
+    let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true);
+    let variants = [mean_curvature, willmore].concat();
     let study = Study::new(&options.study.networks, &variants)?;
     let has = |flow| study.variants().any(|variant| variant.flow == flow);
     let message = "no method is left for one of the two flows: choose other --methods, --scheme or --elements-up-to";
@@ -169,15 +163,14 @@ impl Report {
     fn cost(&self) -> Figure {
         let steps = self.steps;
         let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
-        let shown = look::variants().filter(|&look| own(look).next().is_some());
+        let shown = study::looks().filter(|&look| own(look).next().is_some());
         let curves = shown.map(|(method, scheme)| {
-            let cells: Vec<String> = own((method, scheme))
-                .map(|e| e.variant.n.to_string())
-                .collect();
+            let cells = own((method, scheme)).map(|e| e.variant.n.to_string());
+            let cells: Vec<String> = cells.collect();
             let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
             let point = |e: &Ensemble| [e.seconds_per_step() * steps as f64, e.mean_error(steps)];
             Series::of(name, own((method, scheme)), point)
-                .with_colour(look::colour(method, scheme))
+                .with_colour(study::colour(method, scheme))
                 .with_marker(Marker::Circle)
         });
         let error = Axis::log(format!("mean L² error at t = {:.4}", time(steps)));
@@ -209,7 +202,8 @@ impl Report {
             for circle in &e.circles {
                 circles.extend(self.shown_steps().map(|k| (e, circle, k)));
                 if e.variant.flow == Flow::Willmore {
-                    steps.extend(steps::of((e.variant, circle.radius), &circle.trajectory));
+                    let run = (e.variant, circle.radius);
+                    steps.extend(steps::of(run, &circle.trajectory).skip(1));
                 }
             }
         }

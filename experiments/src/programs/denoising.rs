@@ -4,7 +4,7 @@ use chacha20::ChaCha8Rng;
 
 use crate::meshes::{folder, sampled};
 use crate::prelude::*;
-use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
+use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance, rounds};
 use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
@@ -141,17 +141,12 @@ fn denoise<'a>(
     ];
     let (mut curves, mut taubin) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
-        let smoothed = |count| noisy.smoothed(count, factors[0], factors[1]);
-        let mut mesh = noisy.clone();
-        let mut all: Vec<Quality> = Vec::new();
-        for _ in 0..ITERATIONS {
-            mesh = mesh.smoothed(1, factors[0], factors[1]);
-            all.push(clean.quality(&mesh));
-        }
+        let rounds = rounds(&noisy, factors).take(ITERATIONS);
+        let all: Vec<Quality> = rounds.map(|mesh| clean.quality(&mesh)).collect();
         let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
         let best = best.unwrap_or(0) + 1;
         let clock = Instant::now();
-        let mesh = smoothed(best);
+        let mesh = noisy.smoothed(best, factors[0], factors[1]);
         let row = row(method, Some(best), mesh, clock.elapsed().as_secs_f64());
         let least_normals = least(&all, |quality| quality.normals);
         session.metric(&format!("{}.least_normals", row.key()), least_normals)?;

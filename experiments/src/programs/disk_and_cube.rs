@@ -35,24 +35,17 @@ pub struct Options {
     schemes: SchemeOptions,
 }
 
-impl Options {
-    /// Finite elements are the paper's reference, unless another scheme is wanted of all.
-    fn variants(&self) -> Vec<(Method, Scheme)> {
-        let schemes = |method: Method| match (method.is_learned(), self.schemes.scheme) {
-            (true, _) => self.schemes.schemes(),
-            (false, None | Some(Scheme::Paper)) => vec![Scheme::Paper],
-            (false, Some(_)) => vec![Scheme::Calibrated],
-        };
-        let variants = |&method: &Method| schemes(method).into_iter().map(move |s| (method, s));
-        self.methods.iter().flat_map(variants).collect()
-    }
-}
-
 pub fn program(options: &Options) -> Result<()> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
-    let variants = options.variants();
+    // Finite elements are the paper's reference, unless another scheme is wanted of all.
+    let variants = |&method: &Method| match (method.is_learned(), options.schemes.scheme) {
+        (true, _) => options.schemes.learned(),
+        (false, None | Some(Scheme::Paper)) => vec![(method, Scheme::Paper)],
+        (false, Some(_)) => vec![(method, Scheme::Calibrated)],
+    };
+    let variants: Vec<_> = options.methods.iter().flat_map(variants).collect();
     let message = "--steps must be at least 1, and --methods must name a method";
     require(steps > 0 && !variants.is_empty(), message)?;
     let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
@@ -117,10 +110,8 @@ fn compare_with_exact(
     let all: Vec<&Truth> = exact.iter().collect();
     let runs = sample.second_order(session, n, ramp, &all)?;
     let mut rows = Vec::new();
-    for (run, reached) in [format!("n = {n}"), "extrapolated".to_owned()]
-        .into_iter()
-        .zip(runs)
-    {
+    let names = [format!("n = {n}"), "extrapolated".to_owned()];
+    for (run, reached) in names.into_iter().zip(runs) {
         rows.extend(exact.iter().zip(reached).map(|(exact, reached)| Compared {
             title: sample.title,
             run: run.clone(),

@@ -41,9 +41,8 @@ pub fn program(Options { run: options }: &Options) -> Result<()> {
             curve: exact.curve,
         };
         let initial = equilibrium.start(grid, scales.eps, 0.0)?;
-        let rule = (StepRule::ByEnergy(None), 1);
-        let case = Case::willmore("ellipse", initial, operator.clone(), scales, rule);
-        all.push(equilibrium.relax(&mut session, case, None)?);
+        let (start, flow) = (("ellipse", initial), (operator.clone(), scales));
+        all.push(equilibrium.relax(&mut session, start, flow, None)?);
     }
     let panels = all.iter().map(|one| {
         let (w, exact) = (one.energy(), one.exact_energy());

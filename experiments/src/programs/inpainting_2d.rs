@@ -65,7 +65,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
 pub fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
-    let grid = Grid::<2>::per_unit(n, 1.0)?.with_origin([-0.5; 2])?;
+    let grid = Grid::<2>::per_unit(n, 1.0)?;
     let mut scales = Scales::of_grid(1.0 / n as f64, EPS_OVER_H);
     // Steps are large here, tau/tautilde^2 up to 2^29: in single precision products would lose the slow modes of the Hessian.
     scales.newton.precision = Precision::Device;
@@ -127,7 +127,7 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
     let panels = shown.into_iter().map(|(name, field)| {
         Shapes::new(name, [[-0.5, 0.5]; 2])
-            .with_curve(look::outline(&field).filled(Colour::LightGrey))
+            .with_curve(study::outline(&field).filled(Colour::LightGrey))
             .with_curve(frame.clone().with_width(1.6))
     });
     let title = format!("Inpainting: {}", one.shape.title);

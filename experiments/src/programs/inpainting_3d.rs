@@ -133,13 +133,10 @@ fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
         let w = finite_elements.or(scheme).map(|w| format!(": w = {w:.2}"));
         let w = w.unwrap_or_default();
         snapshot.caption = format!("step {step}{time}{w}{distance}");
-        let edges = Tube::edges_of_box([low; 3], [high; 3], EDGE).into_iter();
-        snapshot.tubes = edges
-            .map(|edge| Tube {
-                colour: GREEN,
-                ..edge
-            })
-            .collect();
+        snapshot.tubes = Tube::edges_of_box([low; 3], [high; 3], EDGE);
+        for edge in &mut snapshot.tubes {
+            edge.colour = GREEN;
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use crate::prelude::*;
-use crate::training::{NetworkSpec, held_out_radii};
+use crate::training::{NetworkSpec, held_out_radii, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{NeededNetwork, Network, Quality};
 use report::Heatmap;
@@ -32,7 +32,7 @@ pub fn program(options: &Options) -> Result<()> {
     let mut session = Session::open("learned_networks", run, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in networks {
-        let quality = quality::measure(&mut session, &spec, &network)?;
+        let quality = spec.measure(&mut session, &network)?;
         shown.push(Shown {
             entries: entries(spec, &network),
             spec,
@@ -58,12 +58,13 @@ pub fn program(options: &Options) -> Result<()> {
         .data("kernel", |at| at.kernel)
         .data("heat_kernel", |at| at.heat_kernel);
     session.csv(kernels, "kernels")?;
-    let activations: Vec<ActivationRow> = shown.iter().flat_map(Shown::activation).collect();
+    let arguments = |one| arguments().map(move |w| (one, w));
+    let activations: Vec<(&Shown, f64)> = shown.iter().flat_map(arguments).collect();
     let activations = Sheet::of(&activations)
-        .data("network", |at| at.network)
-        .data("w", |at| at.w)
-        .data("activation", |at| at.activation)
-        .data("splitting", |at| at.splitting);
+        .data("network", |(one, _)| one.spec.name)
+        .data("w", |(_, w)| *w)
+        .data("activation", |(one, w)| one.activation(*w))
+        .data("splitting", |(one, w)| one.splitting(*w));
     session.csv(activations, "activations")?;
     let both = |one| ["axis", "diagonal"].map(|direction| Shown::transfer(one, direction));
     let transfers: Vec<TransferRow> = shown.iter().flat_map(both).flatten().collect();
@@ -79,7 +80,7 @@ pub fn program(options: &Options) -> Result<()> {
         .collect();
     session.output.write_json("networks.json", &origins)?;
     let table = Sheet::of(&shown).text("network", |one| one.spec.name);
-    session.sheet(quality::columns(table, |one| &one.quality), "quality")?;
+    session.sheet(quality(table, |one| &one.quality), "quality")?;
     session.finish("Quality of the learned operators")
 }
 
@@ -121,13 +122,6 @@ fn entries(spec: NetworkSpec, network: &Network) -> Vec<Entry> {
     entries.map(entry).collect()
 }
 
-struct ActivationRow {
-    network: &'static str,
-    w: f64,
-    activation: f64,
-    splitting: f64,
-}
-
 /// The transfer function of a kernel along an axis or a diagonal, and `exp(-tautilde k^2)` of the heat kernel.
 struct TransferRow {
     network: &'static str,
@@ -137,20 +131,24 @@ struct TransferRow {
     heat: f64,
 }
 
+/// Those of activations in tables and figures.
+fn arguments() -> impl Iterator<Item = f64> {
+    (0..=400).map(|i| -1.0 + f64::from(i) / 200.0)
+}
+
 impl Shown {
     fn title(&self) -> String {
         let width = self.spec.ratios.width;
         format!("n = {}, {width} × {width} kernel", self.spec.cells)
     }
 
-    fn activation(&self) -> impl Iterator<Item = ActivationRow> {
-        let values = (0..=400).map(|i| -1.0 + f64::from(i) / 200.0);
-        values.map(|w| ActivationRow {
-            network: self.spec.name,
-            w,
-            activation: self.network.activation().value(w),
-            splitting: splitting_activation(self.spec.ratios.step_over_eps2(), w),
-        })
+    fn activation(&self, w: f64) -> f64 {
+        self.network.activation().value(w)
+    }
+
+    /// The activation of the splitting scheme.
+    fn splitting(&self, w: f64) -> f64 {
+        splitting_activation(self.spec.ratios.step_over_eps2(), w)
     }
 
     fn transfer(&self, direction: &'static str) -> impl Iterator<Item = TransferRow> {
@@ -193,10 +191,9 @@ fn operators_figure(shown: &[Shown]) -> Figure {
         Heatmap::new(one.title(), axes, [width, width], values)
     };
     let activation = |one: &Shown| {
-        let learned = Series::of("learned F", one.activation(), |at| [at.w, at.activation]);
-        let splitting = Series::of("splitting scheme", one.activation(), |at| {
-            [at.w, at.splitting]
-        });
+        let learned = Series::of("learned F", arguments(), |w| [w, one.activation(w)]);
+        let splitting = |w| [w, one.splitting(w)];
+        let splitting = Series::of("splitting scheme", arguments(), splitting);
         LineChart::new("", Axis::linear("w"), Axis::linear("F(w)"))
             .with_curves([learned.with_width(3.6), thin(splitting, LineStyle::Dashed)])
     };

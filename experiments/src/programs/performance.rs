@@ -242,14 +242,11 @@ fn parts<const D: usize>(run: &Run<D>, floor_ms: f64) -> [(&'static str, f64); 7
 /// The cost of a step, and where the time goes: a colour for each part, a line style for each dimension.
 fn figure(all: &[Measurement], plane: &str) -> Figure {
     let solids = all.iter().filter(|m| m.cells.len() == 3);
-    let solids: Vec<_> = solids
-        .map(|m| format!("a {} at n = {}", m.case, m.n))
-        .collect();
-    let [mut cost, mut shares] = [
-        ("cost of a step", "median step [s]"),
-        ("where the time goes", "mean per step [s]"),
-    ]
-    .map(|(title, y)| LineChart::new(title, Axis::log("unknowns"), Axis::log(y)));
+    let solids = solids.map(|m| format!("a {} at n = {}", m.case, m.n));
+    let solids: Vec<String> = solids.collect();
+    let chart = |title: &str, y: &str| LineChart::new(title, Axis::log("unknowns"), Axis::log(y));
+    let mut cost = chart("cost of a step", "median step [s]");
+    let mut shares = chart("where the time goes", "mean per step [s]");
     let (mut slopes, mut entries) = (Vec::new(), Vec::new());
     for (dimension, style) in [(2, LineStyle::Solid), (3, LineStyle::Dashed)] {
         let rows = || all.iter().filter(|m| m.cells.len() == dimension);

@@ -1,6 +1,6 @@
 use crate::prelude::*;
 use crate::surfaces::Setting;
-use crate::training::NetworkSpec;
+use crate::training::{NetworkSpec, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
 
 const TITLE: &str = "Spheres by the network for surfaces";
@@ -57,7 +57,7 @@ const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
 
 /// Methods and schemes of mean curvature flow.
 fn variants() -> impl Iterator<Item = (Method, Scheme)> {
-    look::variants().filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
+    study::looks().filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
 }
 
 pub fn program(options: &Options) -> Result<()> {
@@ -84,9 +84,9 @@ pub fn program(options: &Options) -> Result<()> {
     if !run.quick {
         let (spec, papers) = (NetworkSpec::SURFACES, setting.operator(PAPERS)?);
         let network = &papers.network().expect("it is learned").network;
-        let measured = [quality::measure(&mut session, &spec, network)?];
+        let measured = [spec.measure(&mut session, network)?];
         let names = Sheet::of(&measured).text("network", |_| spec.name);
-        session.sheet(quality::columns(names, |measured| measured), "quality")?;
+        session.sheet(quality(names, |measured| measured), "quality")?;
     }
     let note = format!(
         "n = {}, ε = 2/n, inner step 1/n². Energies by the schemes are those after the steps of Willmore flow, of the relaxed profile.",
@@ -139,12 +139,11 @@ fn measure(
         });
     }
     let still = case(PAPERS, TAU, 0)?;
+    let (elements, u) = (still.implicit_elements()?, still.initial.field()?);
     Ok(Measurement {
         radius,
         mcf,
-        w_elements: still
-            .implicit_elements()?
-            .willmore_energy(&still.initial.field()?)?,
+        w_elements: elements.willmore_energy(&u)?,
         willmore,
     })
 }
@@ -192,7 +191,7 @@ fn curve(
         Scheme::Accurate => Marker::Diamond,
     };
     Series::of(method.label_in(scheme), all, |m| [m.radius, value(m)])
-        .with_colour(look::colour(method, scheme))
+        .with_colour(study::colour(method, scheme))
         .with_marker(marker)
 }
 

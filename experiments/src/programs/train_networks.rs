@@ -1,11 +1,15 @@
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::training::{NetworkSpec, in_double_precision, train};
+use crate::training::{NetworkSpec, held_out_radii, in_double_precision, quality};
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
-use model::training::{self, CurvePoint, Trained};
+use model::training::{self, Checkpoint, CurvePoint, Trained, Training};
+use serde::de::DeserializeOwned;
+use std::time::Duration;
+
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
@@ -53,7 +57,20 @@ impl Recipe {
 }
 
 pub fn program(options: &Options) -> Result<()> {
-    let chosen = options.chosen()?;
+    let all = match options.recipe {
+        Recipe::Accurate => NetworkSpec::ACCURATE,
+        Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::PAPER,
+    };
+    let (names, mut chosen): (Vec<&str>, Vec<_>) =
+        all.iter().map(|&spec| (spec.name, spec)).unzip();
+    for name in &options.only {
+        let all = names.join(", ");
+        let message = format!("no network is called '{name}'; there are {all}");
+        require(names.contains(&name.as_str()), message)?;
+    }
+    if !options.only.is_empty() {
+        chosen.retain(|spec| options.only.iter().any(|name| name == spec.name));
+    }
     require(options.adam_epochs > 0, "--adam-epochs must be at least 1")?;
     let run = &in_double_precision(&options.run)?;
     let (lm, accurate) = (LmParams::new(run.quick), LeastSquaresParams::new(run.quick));
@@ -109,32 +126,12 @@ pub fn program(options: &Options) -> Result<()> {
         .text("recipe", |one| one.recipe.look().0)
         .metric("seconds", |one| one.trained.seconds())
         .metric("iterations", |one| one.trained.curve.len());
-    let sheet = quality::columns(sheet, |one| &one.trained.quality);
+    let sheet = quality(sheet, |one| &one.trained.quality);
     session.sheet(sheet, "quality")?;
     remove_folder(&trainings.checkpoints)?;
     let folder = trainings.folder.as_path().display();
     session.remark(format!("Networks are in {folder}"));
     session.finish("Quality of the trained networks")
-}
-
-impl Options {
-    fn chosen(&self) -> Result<Vec<NetworkSpec>> {
-        let mut specs = match self.recipe {
-            Recipe::Accurate => NetworkSpec::ACCURATE,
-            Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::PAPER,
-        }
-        .to_vec();
-        let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
-        for name in &self.only {
-            let all = names.join(", ");
-            let message = format!("no network is called '{name}'; there are {all}");
-            require(names.contains(&name.as_str()), message)?;
-        }
-        if !self.only.is_empty() {
-            specs.retain(|spec| self.only.iter().any(|name| name == spec.name));
-        }
-        Ok(specs)
-    }
 }
 
 /// Trainings one after the other. Those of the chosen networks are kept and saved at once.
@@ -154,6 +151,7 @@ struct Finished {
 }
 
 impl Trainings {
+    /// Trains a network by a recipe, continuing from its checkpoint.
     fn train<R: training::Recipe>(
         &mut self,
         recipe: Recipe,
@@ -161,10 +159,37 @@ impl Trainings {
         params: &R,
     ) -> Result<Network> {
         let (key, label, _, prefix) = recipe.look();
-        let name = format!("{}-{key}", spec.name);
-        let file = self.checkpoints.path(&format!("{name}.json"))?;
-        let work = |stage: &Stage<'_>| train((spec, params), &file, stage);
-        let trained = (self.session).phase(format!("{} by {label}", spec.name), work)?;
+        let file = (self.checkpoints).path(&format!("{}-{key}.json", spec.name))?;
+        let title = format!("{} by {label}", spec.name);
+        let trained = self.session.phase(title, |stage| {
+            let (options, bar) = (stage.options, &stage.bar);
+            let training = Training {
+                recipe: params,
+                data: spec.data(options.quick)?,
+                seed: options.seed,
+                held_out: held_out_radii(options.quick),
+            };
+            let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
+            let key = key.expect("settings are numbers and names");
+            let mut checkpoint: Checkpoint<R::State> = load(&file, &key).unwrap_or_default();
+            bar.set_position(checkpoint.curve.len() as u64);
+            bar.reset_eta();
+            let mut stored = Instant::now();
+            let mut observer = |at: &training::Progress, checkpoint: &Checkpoint<R::State>| {
+                bar.set_length(at.of as u64);
+                bar.set_position(at.iteration as u64);
+                bar.set_message(format!("{}  {:.2e}", spec.name, at.held_out_loss));
+                if stored.elapsed() >= CHECKPOINT_INTERVAL {
+                    let stores = store(&file, &key, checkpoint);
+                    stores.map_err(|e| model::Error::Training(e.to_string()))?;
+                    stored = Instant::now();
+                }
+                Ok(true)
+            };
+            let trained = training.run(&mut checkpoint, stage.device, &mut observer)?;
+            store(&file, &key, &checkpoint)?;
+            Ok(trained)
+        })?;
         let network = trained.network.clone();
         if self.chosen.contains(spec) {
             let file = format!("{prefix}{}", spec.ratios.file_name());
@@ -195,6 +220,18 @@ impl Trainings {
         }
         Ok(())
     }
+}
+
+/// What is stored in a file, if it is there, readable, and belongs to this key.
+fn load<T: DeserializeOwned>(file: &Path, key: &Value) -> Option<T> {
+    let (found, stored): (Value, T) = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+    (found == *key).then_some(stored)
+}
+
+/// Stores something with all that it depends on, its key, whole or not at all.
+fn store(file: &Path, key: &Value, stored: &impl Serialize) -> Result<(), files::Error> {
+    let text = serde_json::to_string(&(key, stored)).map_err(std::io::Error::from);
+    files::write_atomically(file, |out| out.write_all(text?.as_bytes()))
 }
 
 impl Finished {
@@ -239,4 +276,24 @@ fn figure(all: &[Finished]) -> Figure {
             "Loss: mean squared nodal error on spheres not trained on. Levenberg-Marquardt uses all sampled points in each \
              iteration; an epoch of Adam is one pass over all radii in batches of 10 grids.",
         )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn checkpoints_belong_to_their_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.json");
+        let (key, values) = (json!({ "x": 0.1 + 0.2 }), vec![1.0 / 3.0, -0.0]);
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+        store(&file, &key, &values).unwrap();
+        let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+        assert_eq!(load(&file, &key).map(bits), Some(bits(values)));
+        assert_eq!(load::<Vec<f64>>(&file, &json!({ "x": 0.3 })), None);
+        std::fs::write(&file, "{").unwrap();
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+    }
 }

@@ -3,7 +3,7 @@
 use chacha20::ChaCha8Rng;
 
 use crate::prelude::*;
-use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance};
+use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance, rounds};
 use rand::{RngExt, SeedableRng};
 use surfaces::{TAUBIN, samples};
 use volumes::{Body, Inside, Volume};
@@ -45,15 +45,23 @@ struct Segmented {
     grid: Grid<3>,
 }
 
-/// What became of it: key and words for how, and the Willmore energy in units of a sphere's by implicit finite elements.
+/// What became of it, with key and words for how.
 struct Row<'a> {
     of: &'a Segmented,
     treatment: (&'static str, &'static str),
     iterations: Option<usize>,
-    volume: f64,
-    energy: f64,
+    numbers: Numbers,
     surface: TriangleMesh,
 }
+
+/// By how much the volume differs from that of the voxels, the Willmore energy in units of a sphere's, the largest distance from the surface by
+/// marching tetrahedra, and the root of the mean square distance to the shape.
+const COLUMNS: [(&str, Format, &str); 4] = [
+    ("volume, %", Fixed(4), "volume"),
+    ("w / 8 pi by elements", Fixed(3), "w_over_8pi"),
+    ("largest displacement", Fixed(3), "displacement"),
+    ("distance to the shape", Fixed(4), "rms"),
+];
 
 pub fn program(options: &Options) -> Result<()> {
     let full = usize::from(!options.run.quick);
@@ -72,17 +80,12 @@ pub fn program(options: &Options) -> Result<()> {
         pictures.extend(drawn?);
         rows.extend(treated);
     }
-    let elements = ("w / 8 pi by elements", Fixed(3));
-    let displacement = ("largest displacement", Fixed(3));
     let table = Sheet::of(&rows)
         .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment.0))
         .text("body", |row| row.of.name)
         .text("surface", |row| row.treatment.1)
         .column("iterations", Shortest, |row| row.iterations)
-        .measure("volume", ("volume, %", Fixed(4)), Row::change)
-        .measure("w_over_8pi", elements, |row| row.energy)
-        .measure("displacement", displacement, Row::displacement)
-        .measure("rms", ("distance to the shape", Fixed(4)), Row::distance);
+        .numbers(&COLUMNS, |row| &row.numbers);
     session.sheet(table, "unshrinking")?;
     let figure = Figure::new(TITLE, 5).with_row_labels(BODIES.map(|(name, _)| name));
     session.figure(figure.with_panels(pictures), "surfaces")?;
@@ -129,6 +132,7 @@ impl Segmented {
         let (t, taubin) = self.smoothed(TAUBIN)?;
         let (l, laplacian) = self.smoothed(LAPLACIAN)?;
         let (none, kept, free) = (None, Some(true), Some(false));
+        let from_marched = MeshDistance::new(marched);
         // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
         let all = [
             ("marched", "marching tetrahedra", marched, None, none),
@@ -149,7 +153,7 @@ impl Segmented {
                 let mut surface = start.mesh().clone();
                 let mut volume = start.volume();
                 if let Some(keeps) = flow {
-                    case.held.volume = keeps.then_some(Target::keep(self.body.surface.volume()));
+                    case.held.volume = keeps.then_some(Target::keep(body.volume()));
                     let run = stage.run(case.clone())?;
                     u = run.stored().clone();
                     volume = ZeroSet::of(&u, case.scales.eps)?.volume;
@@ -157,12 +161,19 @@ impl Segmented {
                         .with_volume(volume, |_| true);
                 }
                 let elements = case.implicit_elements()?.willmore_energy(&u.field()?)?;
+                let vertices = surface.vertices.iter();
+                let gone = vertices.map(|&x| from_marched.signed_distance(x).abs());
+                let numbers = Numbers::from([
+                    ("volume", 100.0 * (volume / body.volume() - 1.0)),
+                    ("w_over_8pi", elements / (8.0 * PI)),
+                    ("displacement", gone.fold(0.0, f64::max)),
+                    ("rms", rms_distance(&surface, &*self.shape)),
+                ]);
                 Ok(Row {
                     of: self,
                     treatment: (key, words),
                     iterations,
-                    volume,
-                    energy: elements / (8.0 * PI),
+                    numbers,
                     surface,
                 })
             })
@@ -171,41 +182,19 @@ impl Segmented {
     }
 
     /// The surface after the number of iterations that brings it nearest to the shape.
-    fn smoothed(&self, [lambda, mu]: [f64; 2]) -> Result<(usize, ClosedMesh)> {
-        let mut mesh = self.marched.mesh().clone();
-        let mut best = (f64::INFINITY, 0, mesh.clone());
-        for count in 1..=ITERATIONS {
-            mesh = mesh.smoothed(1, lambda, mu);
-            let distance = rms_distance(&mesh, &*self.shape);
-            if distance < best.0 {
-                best = (distance, count, mesh.clone());
-            }
-        }
-        Ok((best.1, ClosedMesh::new(best.2)?.0))
+    fn smoothed(&self, factors: [f64; 2]) -> Result<(usize, ClosedMesh)> {
+        let rounds = (1..=ITERATIONS).zip(rounds(self.marched.mesh(), factors));
+        let measured = rounds.map(|(k, mesh)| (rms_distance(&mesh, &*self.shape), k, mesh));
+        let nearest = measured.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (_, count, mesh) = nearest.expect("there are iterations");
+        Ok((count, ClosedMesh::new(mesh)?.0))
     }
 }
 
 impl Row<'_> {
-    /// Of the volume of the voxels, in percent.
-    fn change(&self) -> f64 {
-        100.0 * (self.volume / self.of.body.surface.volume() - 1.0)
-    }
-
-    fn distance(&self) -> f64 {
-        rms_distance(&self.surface, &*self.of.shape)
-    }
-
-    /// The largest distance from the surface by marching tetrahedra.
-    fn displacement(&self) -> f64 {
-        let distance = MeshDistance::new(&self.of.marched);
-        let vertices = self.surface.vertices.iter();
-        let all = vertices.map(|&x| distance.signed_distance(x).abs());
-        all.fold(0.0, f64::max)
-    }
-
     fn picture(&self) -> Result<Raster> {
         let frame = (self.of.up, self.of.marched.bounding_box());
-        let change = report::signed(&format!("{:+.2}", self.change()));
+        let change = report::signed(&format!("{:+.2}", self.numbers["volume"]));
         let caption = format!("{}\nvolume {change} %", self.treatment.1);
         mesh_raster(&self.surface, frame, caption)
     }

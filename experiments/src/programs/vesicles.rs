@@ -94,9 +94,8 @@ pub fn program(options: &Options) -> Result<()> {
                 Some(relaxed) if k > 0 => relaxed.field.clone(),
                 _ => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
             };
-            let (operator, time) = (setting.operator(ACCURATE)?, (StepRule::ByEnergy(None), 1));
-            let case = Case::willmore(name, initial, operator, setting.scales, time);
-            all.push(equilibrium.relax(&mut session, case, steps)?);
+            let flow = (setting.operator(ACCURATE)?, setting.scales);
+            all.push(equilibrium.relax(&mut session, (name, initial), flow, steps)?);
         }
     }
     session.sheet(equilibria::sheet(&all), "energies")?;

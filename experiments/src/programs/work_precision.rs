@@ -93,16 +93,15 @@ struct Compared<'a> {
 }
 
 pub fn program(Options { run: options }: &Options) -> Result<()> {
-    let used = if options.quick { 1 } else { usize::MAX };
-    let marks: Vec<usize> = MARKS.into_iter().take(used).collect();
-    let cells: Vec<usize> = CELLS.into_iter().take(used).collect();
+    let marks = &MARKS[..options.either(1, MARKS.len())];
+    let cells = &CELLS[..options.either(1, CELLS.len())];
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
     let mut session = Session::open("work_precision", options, parameters)?;
     let (mut rows, mut ratios) = (Vec::new(), Vec::new());
     let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, time(k))).collect();
     let in_plane = steppings(STEP, options.quick);
     for sample in &CURVES {
-        let at = (&cells[..], &times[..]);
+        let at = (cells, &times[..]);
         rows.extend(compare(&mut session, sample, at, &in_plane, &mut ratios)?);
     }
     let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
@@ -128,7 +127,7 @@ pub fn program(Options { run: options }: &Options) -> Result<()> {
         ("seconds", "seconds", |reached| reached.seconds),
     ];
     for (stem, axis, work) in work {
-        session.figure(figure(&rows, &marks, axis, work), stem)?;
+        session.figure(figure(&rows, marks, axis, work), stem)?;
     }
     session.sheet(sheet(&rows), "errors")?;
     session.finish(TITLE)
@@ -299,12 +298,10 @@ fn figure(rows: &[Compared<'_>], marks: &[usize], axis: &str, work: fn(&Reached)
     let mut shown: Vec<usize> = vec![marks[1.min(marks.len() - 1)], marks[marks.len() - 1]];
     shown.dedup();
     let [coarse, fine] = CELLS;
-    let curves = CURVES
-        .iter()
-        .map(|sample| (sample.key, sample.title, [coarse, fine]));
+    let curves = CURVES.map(|sample| (sample.key, sample.title, [coarse, fine]));
     let surface = (SURFACE.key, SURFACE.title, [coarse / 2, fine / 2]);
     let mut figure = Figure::new(format!("{TITLE}: work and precision"), shown.len());
-    for (key, title, cells) in curves.chain([surface]) {
+    for (key, title, cells) in curves.into_iter().chain([surface]) {
         for &mark in &shown {
             let mut curves: Vec<Series> = Vec::new();
             let styles = [(LineStyle::Dashed, "coarse"), (LineStyle::Solid, "fine")];
