@@ -5,13 +5,8 @@
 
 use engine::METRICS;
 use pages::{
-<<<<<<< ours
-    Facts, Image, Markup, Page, Section, Table, figure, five_digits, frames, markdown, thinned,
-    viewer,
-=======
-    Details, Facts, Figure, Frames, Image, Page, Section, Table, Text, View, Viewer, five_digits,
-    thinned,
->>>>>>> theirs
+    Facts, Image, Markup, Page, Section, Table, View, figure, five_digits, frames, markdown,
+    thinned, viewer,
 };
 use report::{Axis, LineChart, Marker, Series};
 
@@ -103,11 +98,7 @@ impl Files<'_> {
         Ok((!drawings.is_empty()).then(|| frames("The shape over the steps", &drawings)))
     }
 
-<<<<<<< ours
     fn surfaces(&self) -> Result<Option<Markup>> {
-        let stages = self.stages(self.before(), &MESHES);
-=======
-    fn surfaces(&self) -> Result<Option<Viewer>> {
         // Where the vertices of a mesh follow the flow, it is itself the shape at the beginning.
         let is_own = (self.run.files()).any(|name| name.starts_with(own::INPUT));
         let before = if is_own {
@@ -116,7 +107,6 @@ impl Files<'_> {
             presentation::START
         };
         let stages = self.stages(before, &MESHES);
->>>>>>> theirs
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
         else {
@@ -128,21 +118,11 @@ impl Files<'_> {
         let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
             .collect::<Result<_>>()?;
-<<<<<<< ours
         let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
-        Ok(Some(Viewer::new(
-=======
-        let up = UpAxis::deserialize(&engine::notes(self.run)["outlet"]["up"]);
         Ok(Some(viewer(
->>>>>>> theirs
             "The surface over the steps",
-<<<<<<< ours
             &Image::from_bytes(presentation::PICTURE, &poster)?,
-            view(up.unwrap_or_default()),
-=======
-            Image::from_bytes(presentation::PICTURE, &poster)?,
             View::of_mesh(up.unwrap_or_default()),
->>>>>>> theirs
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
     }
@@ -199,16 +179,10 @@ impl Files<'_> {
             "{shown} of {all} steps in five digits; all digits of all steps are in `{METRICS}`."
         );
         let head = table.head().iter().map(|key| in_words(&COLUMNS, key));
-<<<<<<< ours
-        let rows = rows().map(|row| row.iter().map(|cell| shortened(cell)));
-        let table = Section::new("Steps as a table")
-            .with(markdown(&note))
-=======
         let shortened = |cell: &String| cell.parse().map_or_else(|_| cell.clone(), five_digits);
         let rows = rows().map(|row| row.iter().map(shortened));
-        let details = Details::new("Steps as a table")
-            .with(Text::markdown(&note))
->>>>>>> theirs
+        let table = Section::new("Steps as a table")
+            .with(markdown(&note))
             .with(Table::new("Steps", head, rows)?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
         Ok(Section::new("Steps")
