@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{outcome, program, text};
+use crate::common::{column, outcome, program, text};
 use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::{Grid, SignedDistance, npy, phase_field};
 use serde_json::Value;
@@ -22,18 +22,6 @@ fn of_field(folder: &Path, [command, field, run]: [&str; 3], options: &[&str]) -
     let box_side = ["--box-side", "0.75", "--output", run];
     let arguments = [&[command, field][..], &box_side, options].concat();
     outcome(folder, &arguments)
-}
-
-/// A column of the metrics of a run; absent values are not numbers.
-fn column(run: &Path, name: &str) -> Vec<f64> {
-    let text = fs::read_to_string(run.join("metrics.csv")).unwrap();
-    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let head = lines.next().unwrap();
-    let place = head.iter().position(|column| *column == name);
-    let place = place.unwrap_or_else(|| panic!("no {name} in {head:?}"));
-    lines
-        .map(|row| row[place].parse().unwrap_or(f64::NAN))
-        .collect()
 }
 
 #[test]

@@ -124,3 +124,15 @@ pub fn interrupt(child: &mut Child) {
 pub fn with_output<'a>(arguments: &[&'a str], output: &'a str) -> Vec<&'a str> {
     [arguments, &["--output", output]].concat()
 }
+
+/// A column of the metrics of a run; absent values are not numbers.
+pub fn column(run: &Path, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(run.join("metrics.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let place = head.iter().position(|column| *column == name);
+    let place = place.unwrap_or_else(|| panic!("no {name} in {head:?}"));
+    lines
+        .map(|row| row[place].parse().unwrap_or(f64::NAN))
+        .collect()
+}

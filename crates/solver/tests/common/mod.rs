@@ -1,11 +1,9 @@
 //! What the tests share: networks, discs and small objectives on the host.
 use burn::tensor::Tensor;
-use chacha20::ChaCha8Rng;
 use geometry::{Field, Grid, phase_field, shapes::Ball};
 use model::training::levenberg_marquardt::heat_kernel;
 use model::{Network, Ratios, Shipped};
 use operators::ComputeDevice;
-use rand::{RngExt, SeedableRng};
 use solver::{Error, FlowParams, Objective};
 
 pub fn device() -> ComputeDevice {
@@ -57,8 +55,15 @@ pub fn values<const D: usize>(u: &Tensor<D>) -> Vec<f64> {
 
 /// Reproducible numbers in `[-1, 1)`.
 pub fn noise(count: usize, seed: u64) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    (0..count)
+        .map(|_| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            2.0 * (state >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
+        })
+        .collect()
 }
 
 /// An objective times a number: units of energy must not matter.
