@@ -1,6 +1,5 @@
 //! Single options: what they change, and what they leave as it is.
 
-use std::fs;
 use std::path::Path;
 
 use geometry::shapes::{Ball, Ellipse};
