@@ -142,9 +142,11 @@ impl RunCommand {
         let grid = *start.initial.grid();
         let RunOptions { scheme, input, .. } = self.options();
         let (mut scales, operator) = scheme.operator(method, &grid)?;
-        // The length that a unit of the usual box has: time steps that follow from the inner step do so in a box of that size.
-        let unit = grid.side() / input.box_side.unwrap_or(usual_box::<D>().1);
-        let inner = scales.mcf_step * unit.powi(2);
+        // Time steps that follow from the inner step, a length squared, do so in a box of this side, which gives them their unit.
+        let in_box = |side: f64| scales.mcf_step * (grid.side() / side).powi(2);
+        let (_, usual_side) = usual_box::<D>();
+        let inner = in_box(input.box_side.unwrap_or(usual_side));
+        let usual_inner = in_box(usual_side);
         let usual = self.usual_rule(inner, grid.spacing());
         let rule = match self.willmore() {
             Some(flow) => *flow.tau.insert(flow.tau.unwrap_or(usual).resolved(inner)),
@@ -164,8 +166,8 @@ impl RunCommand {
                     Some(Amount::Percent(percent)) => control.relative = percent / 100.0,
                     None => (),
                 }
-                // On coarse grids the usual first step is long against the shape.
-                control.first = Some((inner / 16.0).min(16.0 * scales.eps.powi(4)));
+                // On coarse grids the usual first step is long against the shape. In another unit of length it is the same.
+                control.first = Some((usual_inner / 16.0).min(16.0 * scales.eps.powi(4)));
                 TimeSteps::controlled(control)
             }
             rule => TimeSteps {

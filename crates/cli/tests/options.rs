@@ -24,19 +24,29 @@ fn write_ellipse(path: &Path) {
     .unwrap();
 }
 
-/// Controlled steps with a smaller tolerance are more, and of a smaller estimated error.
+/// Tolerances of controlled steps are lengths in the units of the input: a smaller one makes more steps of a smaller estimated error, and the
+/// same shape in another unit, here a power of two, has the same run.
 #[test]
-fn smaller_tolerances_make_smaller_errors() {
+fn tolerances_are_lengths_in_the_units_of_the_input() {
     let folder = tempfile::tempdir().unwrap();
     write_ellipse(&folder.path().join("ellipse.npy"));
-    let flow = |name: &str, tolerance: &str| {
+    let flow = |name: &str, unit: f64, tolerance: f64| {
+        let options = [
+            ("--box-side", 0.75 * unit),
+            ("--tolerance", tolerance * unit),
+            ("--time", 2e-3 * unit.powi(4)),
+        ];
+        let values = options.map(|(_, value)| value.to_string());
+        let options = options.iter().zip(&values);
+        let options = options.flat_map(|((option, _), value)| [*option, value.as_str()]);
         let run = ["flow", "ellipse.npy", "--output", name];
-        let options = ["--box-side", "0.75", "--time", "2e-3"];
-        let tolerance = ["--tolerance", tolerance];
-        outcome(folder.path(), &[&run[..], &options, &tolerance].concat())
+        outcome(
+            folder.path(),
+            &run.into_iter().chain(options).collect::<Vec<_>>(),
+        )
     };
-    let loose = flow("loose", "1e-3");
-    let tight = flow("tight", "1e-5");
+    let loose = flow("loose", 1.0, 1e-3);
+    let tight = flow("tight", 1.0, 1e-5);
     let error = |outcome: &Value| number(outcome, "/time_steps/estimated_error");
     assert!(error(&loose) < 1e-3, "{loose}");
     assert!(error(&tight) < 0.9 * error(&loose), "{loose} {tight}");
@@ -44,6 +54,13 @@ fn smaller_tolerances_make_smaller_errors() {
         number(&tight, "/steps") > number(&loose, "/steps"),
         "{loose} {tight}"
     );
+
+    let other = flow("other", 128.0, 1e-3);
+    assert_eq!(other["steps"], loose["steps"]);
+    let last = |name: &str| std::fs::read(folder.path().join(name).join("final.npy")).unwrap();
+    assert!(last("other") == last("loose"));
+    let ratio = error(&other) / error(&loose);
+    assert!((ratio / 128.0 - 1.0).abs() < 1e-9, "{other}");
 }
 
 /// Bricks hold a part of the grid, and the flow on them is that on all of it.

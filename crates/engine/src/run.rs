@@ -247,7 +247,7 @@ impl<const D: usize> Run<D> {
                     minimization
                 }
                 Ok((minimization, false)) => minimization,
-                Err(source) if most == 0 || !source.may_be_of_the_step_size() => {
+                Err(source) if most == 0 || !source.shorter_step_may_succeed() => {
                     return Err(self.failed(source));
                 }
                 Err(_) if halvings < most => None,

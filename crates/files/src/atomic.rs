@@ -83,9 +83,6 @@ pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<
 }
 
 /// The bytes of a file.
-///
-/// # Errors
-/// [`Error`] with the path.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
     std::fs::read(path).map_err(Error::of("read", path))

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::grid::digits;
 use crate::parallel::{self, Reader};
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
@@ -367,16 +368,6 @@ impl<const D: usize> Bricks<D> {
 
 fn flat<const D: usize>(place: [usize; D], per_axis: usize) -> usize {
     place.iter().fold(0, |flat, at| flat * per_axis + at)
-}
-
-/// The inverse of [`flat`].
-pub(crate) fn digits<const D: usize>(mut flat: usize, per_axis: usize) -> [usize; D] {
-    let mut place = [0; D];
-    for at in place.iter_mut().rev() {
-        *at = flat % per_axis;
-        flat /= per_axis;
-    }
-    place
 }
 
 /// The bits of the places along all axes, interleaved: bricks that are near in this order are near in space.

@@ -1,7 +1,6 @@
 //! Periodic cubical grids.
 
 use crate::Error;
-use crate::bricks::digits;
 use crate::error::{finite, positive};
 
 /// A regular grid of `N^D` nodes on a periodic cube of side `L`.
@@ -170,4 +169,14 @@ impl<const D: usize> Grid<D> {
             right_side: other.side,
         })
     }
+}
+
+/// The place of the element at a row-major index in an array with so many elements along each axis.
+pub(crate) fn digits<const D: usize>(mut flat: usize, per_axis: usize) -> [usize; D] {
+    let mut place = [0; D];
+    for at in place.iter_mut().rev() {
+        *at = flat % per_axis;
+        flat /= per_axis;
+    }
+    place
 }

@@ -26,7 +26,7 @@ use files::{Number, write_atomically};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::bricks::digits;
+use crate::grid::digits;
 use crate::parallel::{CHUNK, Reader};
 use crate::{Error, Field, Grid};
 pub use error::NpyError;

@@ -1,4 +1,4 @@
-//! Grids of fewer cells, and fields from and on them.
+//! Fields between grids: from the grid of half as many cells, and on one of every k-th node.
 
 use crate::error::require;
 use crate::{Error, Field, Grid, parallel};
@@ -33,12 +33,19 @@ impl<const D: usize> Field<D> {
         Self::from_values(grid, values)
     }
 
-    /// The values at every k-th node along each axis; `every` must divide the number of cells.
+    /// The values at every k-th node along each axis.
     ///
     /// # Errors
-    /// As [`Grid::new`].
+    /// [`Error::InvalidParameter`] if `every` does not divide the number of cells; as [`Grid::new`].
     pub fn thinned(&self, every: usize) -> Result<Self, Error> {
         let fine = self.grid();
+        let divides = |_| every > 0 && fine.cells().is_multiple_of(every);
+        require(
+            "every",
+            every as f64,
+            "a divisor of the number of cells",
+            divides,
+        )?;
         let coarse = Grid::new(fine.cells() / every, fine.side())?.with_origin(fine.origin())?;
         let value = |node| {
             let place = coarse.multi_index(node).map(|i| every * i);

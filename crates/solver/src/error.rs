@@ -90,7 +90,7 @@ impl Error {
     }
 
     /// Whether a step that failed so may succeed if it is shorter.
-    pub fn may_be_of_the_step_size(&self) -> bool {
+    pub fn shorter_step_may_succeed(&self) -> bool {
         matches!(
             self,
             Self::NotConverged { .. } | Self::NonFinite { .. } | Self::NotHeld { .. }

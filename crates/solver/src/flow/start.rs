@@ -170,7 +170,7 @@ impl<const D: usize> WillmoreFlow<D> {
             self.constraints.carried(&here, &there, self.params.eps)?
         };
         let record = match half.advance(tau) {
-            Err(error) if error.may_be_of_the_step_size() => return Ok(None),
+            Err(error) if error.shorter_step_may_succeed() => return Ok(None),
             record => record?,
         };
         let moved = download(&half.grid, &(half.current.clone() - from), &half.device)?;
