@@ -43,6 +43,6 @@ pub fn mesh_raster(
     (up, frame): (UpAxis, BoundingBox<3>),
     caption: impl Into<String>,
 ) -> Result<Raster> {
-    let scene = (Scene::of_mesh(mesh.clone()).within(frame)).view(View::of_mesh(up));
+    let scene = (Scene::of_mesh(mesh.clone()).within(frame)).view(View::from_front_left(up));
     Ok(raster(&scene.render([420; 2])?, caption))
 }

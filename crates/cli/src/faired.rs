@@ -106,7 +106,7 @@ pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -
             viridis(length / largest)
         }
     });
-    let scene = Scene::of_mesh(mesh.clone()).view(View::of_mesh(up));
+    let scene = Scene::of_mesh(mesh.clone()).view(View::from_front_left(up));
     let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
     let count = lost.iter().filter(|lost| **lost).count();
     let percent = 100.0 / lengths.len().max(1) as f64;

@@ -122,7 +122,7 @@ impl Files<'_> {
         Ok(Some(viewer(
             "The surface over the steps",
             &Image::from_bytes(presentation::PICTURE, &poster)?,
-            View::of_mesh(up.unwrap_or_default()),
+            View::from_front_left(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
     }

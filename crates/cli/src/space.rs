@@ -49,7 +49,7 @@ impl Presentation<3> for Space {
     }
 
     fn picture(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Picture> {
-        let mut scene = Scene::new(u, eps)?.view(View::of_mesh(self.up));
+        let mut scene = Scene::new(u, eps)?.view(View::from_front_left(self.up));
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|b| b.grown([ROOM * b.longest_side(); 3]));
         let both = start.into_iter().chain(scene.bounds());

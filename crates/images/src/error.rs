@@ -4,9 +4,8 @@
 
 use std::path::PathBuf;
 
-use crate::image::LARGEST_IMAGE;
+use crate::image::{LARGEST_FILE, LARGEST_IMAGE};
 use crate::outline::LARGEST_OUTLINE;
-use crate::read::LARGEST_FILE;
 
 /// Errors of images, outlines, placement and drawings, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]

@@ -14,7 +14,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A raster of so many columns and rows of pixels of side `pixel`, by its upper left corner.
+    /// A raster of so many columns and rows of pixels of side `pixel`, by its upper left corner. Numbers must be finite, `pixel`
+    /// positive, and the size one that [`render::checked_size`] accepts.
     pub fn new(size: [u32; 2], upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
         for x in upper_left {
             require("coordinate of the corner", x, "finite", |_| true)?;

@@ -28,6 +28,8 @@ impl Outline {
     ///
     /// At smooth edges the outline is right to a tenth of a pixel if they are blended, and to half a
     /// pixel if they are hard. Corners are cut off by half a pixel.
+    ///
+    /// An image all on one side is refused, and one of more than [`LARGEST_OUTLINE`] segments, which is noise.
     pub fn of_image(image: &Image, side: Side) -> Result<Self, Error> {
         let [width, height] = image.size().map(|n| n as usize);
         let depth = |pixel: usize| side.depth(image.pixel(pixel));
@@ -84,6 +86,7 @@ impl Outline {
     ///
     /// Points every half unit move towards the middle of their neighbours again and again, but none goes further than `tolerance` from
     /// where it was; then each curve gets back the area that it has lost by this. Of an image, [`Tones::raster`](crate::Tones::raster) says how far the points of its outline may be off.
+    /// The tolerance must be finite and positive.
     pub fn smoothed(&self, tolerance: f64) -> Result<Self, Error> {
         positive("tolerance", tolerance)?;
         let curves = self.curves.par_iter();
@@ -95,7 +98,7 @@ impl Outline {
     /// The interface of a phase field: marching squares on `atanh u`, as
     /// [`contour::zero_level`](geometry::contour::zero_level), in the whole box of the grid with
     /// its repeated last layer. Where `u > 0` at a face of the box the curve runs along
-    /// that face, so that all curves are closed.
+    /// that face, so that all curves are closed. `u` must change its sign.
     pub fn of_phase_field(u: &Field<2>) -> Result<Self, Error> {
         u.check_finite()?;
         let (low, high) = range(u.values().iter().copied());

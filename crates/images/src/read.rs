@@ -10,12 +10,9 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use render::Picture;
 
-use crate::image::{LARGEST_IMAGE, pixels};
+use crate::image::{LARGEST_FILE, LARGEST_IMAGE, pixels};
 use crate::{Error, FormatError, Image};
 
-/// Largest image file, in bytes: eight bytes a pixel, as many as the largest image has at 16 bits
-/// without compression.
-pub(crate) const LARGEST_FILE: u64 = 8 * LARGEST_IMAGE as u64;
 /// Most bytes for each pixel while decoding.
 const DEEPEST: u64 = 16;
 

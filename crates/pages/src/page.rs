@@ -165,7 +165,8 @@ fn policy(script: &str) -> String {
     )
 }
 
-/// A part of a page under a heading of its own. Within another section it is a block behind a line that opens it.
+/// A part of a page under a heading of its own. Within another section it is a block behind a line that opens it,
+/// and its name is not used.
 #[must_use]
 #[derive(Clone, Debug)]
 pub struct Section {

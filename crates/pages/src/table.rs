@@ -64,7 +64,7 @@ impl Table {
         Self::new(caption, head, rows)
     }
 
-    /// The first table of a Markdown text, such as `report::Table::to_markdown` writes.
+    /// The first table of a Markdown text, which must have one, such as `report::Table::to_markdown` writes.
     pub fn from_markdown(caption: impl Into<String>, markdown: &str) -> Result<Self> {
         let mut rows: Vec<Vec<String>> = Vec::new();
         for (event, range) in Parser::new_ext(markdown, Options::ENABLE_TABLES).into_offset_iter() {

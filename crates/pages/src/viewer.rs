@@ -11,7 +11,7 @@ use crate::surface::Surface;
 
 /// Surfaces, such as the steps of a flow, of which one is shown and can be turned: one or more with a label each, all seen in one scale
 /// and from one direction. A picture stands in for them until they are started, and wherever they cannot be: without JavaScript or WebGL,
-/// and on paper.
+/// and on paper. Each surface must have a face, and [`View::check`] must accept the view.
 ///
 /// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
 /// those of the triangles around a vertex, weighted by area.

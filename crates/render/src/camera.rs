@@ -35,8 +35,8 @@ impl Default for View {
 }
 
 impl View {
-    /// The usual one of meshes from files: from the front left and a little above.
-    pub fn of_mesh(up: UpAxis) -> Self {
+    /// The usual view of shapes from files: azimuth -60, elevation 25 degrees.
+    pub fn from_front_left(up: UpAxis) -> Self {
         Self {
             up,
             azimuth: -60.0,

@@ -119,7 +119,7 @@ impl Scene {
         Ok(self)
     }
 
-    /// Gives every vertex of the surface its own colour, interpolated between them.
+    /// Gives every vertex of the surface its own colour, one for each, interpolated between them.
     pub fn painted(mut self, colours: Vec<Rgb>) -> Result<Self, Error> {
         let (count, vertices) = (colours.len(), self.mesh.vertices.len());
         let range = "that of the vertices";
@@ -141,7 +141,7 @@ impl Scene {
         self.mesh.bounding_box()
     }
 
-    /// Draws the picture of `[width, height]` pixels.
+    /// Draws the picture of `[width, height]` pixels, as many as [`checked_size`] accepts. There must be something to draw.
     pub fn render(&self, size: [u32; 2]) -> Result<Picture, Error> {
         let size = checked_size(size)?;
         self.mesh.check(f64::MAX)?;

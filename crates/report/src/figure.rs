@@ -45,7 +45,7 @@ const SIDES: RangeInclusive<f64> = 80.0..=2600.0;
 const SMALLEST_PLOT: f64 = 40.0;
 
 impl Figure {
-    /// A figure without panels, which come so many to a row; 800 units wide.
+    /// A figure without panels, 800 units wide, for `columns` panels in a row.
     pub fn new(title: impl Into<String>, columns: usize) -> Self {
         Self {
             title: title.into(),
@@ -104,7 +104,8 @@ impl Figure {
         self
     }
 
-    /// The figure as an SVG document. Text stays text, in a sans-serif family.
+    /// The figure as an SVG document. Text stays text, in a sans-serif family. Every panel needs something to draw, ranges and arrays that
+    /// fit, and room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
         Ok(svg::svg(layout.size, |s| self.draw(&layout, s)))
@@ -155,8 +156,12 @@ impl Figure {
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
         let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
-        let shared = self.shared_legend.then(|| joined(&cells));
-        let legend = Block::new(shared.as_deref().unwrap_or_default(), fonts.tick, inner);
+        let shared = if self.shared_legend {
+            joined(&cells)
+        } else {
+            Vec::new()
+        };
+        let legend = Block::new(&shared, fonts.tick, inner);
         let note_top = legend_top + legend.height;
         let height = (note_top + font::height(&self.note, Fonts::NOTE, inner) + PADDING).round();
         let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
@@ -256,15 +261,15 @@ struct Cell<'a> {
 impl<'a> Cell<'a> {
     fn new(panel: &'a Panel, fonts: Fonts, text_width: f64, own_legend: bool) -> Result<Self> {
         let content = panel.checked(fonts)?;
-        let legend = own_legend.then(|| content.legend());
+        let legend = if own_legend {
+            content.legend()
+        } else {
+            Vec::new()
+        };
         Ok(Self {
             panel,
             content,
-            legend: Block::new(
-                legend.as_deref().unwrap_or_default(),
-                fonts.tick,
-                text_width,
-            ),
+            legend: Block::new(&legend, fonts.tick, text_width),
             fonts,
             text_width,
             plot: Rect::new(0.0, 0.0, text_width - 70.0, 0.5 * text_width),

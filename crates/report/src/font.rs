@@ -121,7 +121,7 @@ impl TextStyle {
         self
     }
 
-    /// The place so many em below another one, as the letters stand.
+    /// The place `down` em below `at` as the letters stand, above it if negative.
     pub fn below(&self, at: DVec2, down: f64) -> DVec2 {
         let step = if self.vertical { DVec2::X } else { DVec2::Y };
         at + down * self.em * step

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, dvec2};
 
-/// With one rounding, unlike [`DVec2::distance`].
+/// The distance of two points by `hypot`, which rounds less than [`DVec2::distance`].
 pub(crate) fn distance(a: DVec2, b: DVec2) -> f64 {
     (a.x - b.x).hypot(a.y - b.y)
 }

@@ -23,7 +23,7 @@ impl OutputDir {
         Ok(Self { path })
     }
 
-    /// A folder inside this one, created and checked likewise.
+    /// A folder inside this one, named as in [`Self::path`], created and checked likewise.
     pub fn subfolder(&self, name: &str) -> Result<Self> {
         Self::create(self.path(name)?)
     }

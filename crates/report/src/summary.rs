@@ -13,7 +13,7 @@ use crate::table::Cell;
 /// Metric names and their values, sorted by name.
 ///
 /// Names are lower-case words of ASCII letters, digits and `_` (not at their start), the first one starting with a letter, joined by
-/// `.`, such as `circle.error_l2`. Values are finite. The same content gives the same bytes: floats have the fewest digits that read
+/// `.`, such as `circle.error_l2`. Values are finite, and no name is set twice. The same content gives the same bytes: floats have the fewest digits that read
 /// back exactly.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[serde(transparent)]

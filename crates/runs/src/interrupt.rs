@@ -20,7 +20,7 @@ impl Interrupt {
     /// SIGINT.
     pub const EXIT_CODE: u8 = 130;
 
-    /// Starts to catch the signals.
+    /// Starts to catch the signals; [`Error::Signals`] if the system does not let it.
     pub fn catch() -> Result<Self, Error> {
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {

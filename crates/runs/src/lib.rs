@@ -57,6 +57,8 @@
 //!   length of a checkpoint (twice, unless its arrays are constant), twenty times its list of files (64 MiB at most), 160 times its notes (at
 //!   most [`State::MAX_NOTES`]), forty times `timings.json`, and 64 KiB for anything else.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
+//!
+//! Whatever touches files fails with [`Error::Io`]; other errors are named where they arise.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

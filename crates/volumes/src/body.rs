@@ -84,7 +84,7 @@ impl Volume {
             .fold(all, |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// The body that some voxels are, as a closed surface. Outside of the volume is outside.
+    /// The body that some voxels are, of which there must be one, as a closed surface. Outside of the volume is outside.
     ///
     /// The surface of labels is that by marching tetrahedra without its steps, which tell of the voxels and not of the body: vertices
     /// move towards the middle of their neighbours again and again while the volume stays that of the voxels, but each stays

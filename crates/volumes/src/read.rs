@@ -101,7 +101,7 @@ struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// Of a header of that many bytes.
+    /// The fields of a header of `length` bytes, refused if there are fewer.
     fn new(bytes: &'a [u8], length: usize, big_endian: bool) -> Result<Self, FormatError> {
         if bytes.len() < length {
             return Err(FormatError::Length {

@@ -38,7 +38,7 @@ impl Voxels {
 
 impl Volume {
     /// Labels in a row, the first axis fastest, of voxels with these sides, finite and positive, from the centre of the first one. There
-    /// are two voxels along each axis at least.
+    /// are two voxels along each axis at least, and as many labels as voxels.
     pub fn of_labels(
         size: [usize; 3],
         origin: [f64; 3],
