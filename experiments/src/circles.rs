@@ -165,6 +165,8 @@ mod tests {
                     let gap = 0.5 * cells as f64 / n as f64 - r.max(last);
                     assert!((MARGIN..MARGIN + 0.15).contains(&gap), "{gap}");
                     assert!(cells.is_multiple_of(2) && is_smooth(cells));
+                    // Less than in a box of side 2.
+                    assert!(n > 128 || cells < 256, "{cells}");
                     assert!(1.0 + geometry::optimal_profile(gap, EPS) < 1e-12);
                 }
             }

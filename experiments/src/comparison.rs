@@ -235,7 +235,7 @@ fn sampled(steps: usize) -> impl Iterator<Item = usize> {
 impl Compared {
     fn loops(&self, step: usize) -> Result<Curve> {
         let field = self.trajectory.field(step * self.ratio)?;
-        Ok(study::outline(&field))
+        Ok(study::zero_level_curve(&field))
     }
 }
 
@@ -344,7 +344,7 @@ impl Comparison<'_> {
     /// Rows: methods at their finest resolution, and the reference; columns: times.
     fn shape_figure(&self) -> Result<Figure> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
-        for shown in study::looks() {
+        for shown in study::methods_in_schemes() {
             let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();
             if let Some(run) = self.runs.iter().filter(own).max_by_key(|run| run.variant.n) {
                 rows.push((run, run.variant.label().replace(", ", "\n")));

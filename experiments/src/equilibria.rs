@@ -173,7 +173,7 @@ impl<const D: usize> AtRest<D> {
         let half = radii * self.equilibrium.radius;
         let exact = self.equilibrium.outline();
         Shapes::new(caption, [[-half, half]; 2])
-            .with_curve(study::outline(plane).filled(Colour::LightGrey))
+            .with_curve(study::zero_level_curve(plane).filled(Colour::LightGrey))
             .with_curve(Curve::new([exact]).with_colour(0).with_width(1.0))
     }
 

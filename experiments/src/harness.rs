@@ -1,9 +1,14 @@
 //! The outermost layer of every program, and running many independent tasks.
 
+use std::collections::BTreeMap;
+use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::prelude::*;
+use clap::Parser;
+use operators::{ComputeDevice, memory};
+
+use crate::Result;
 
 /// Runs a program with the options of the command line.
 pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<()>) -> ExitCode {

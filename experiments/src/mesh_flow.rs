@@ -19,11 +19,11 @@ pub struct MeshFlow {
     /// Steps to be shown, with the energies that the paper reports.
     shown: &'static [(usize, Option<f64>)],
     view: View,
-    /// That of [`Setting::run`].
+    /// Looks at the flows and says what else the note should say, see [`Setting::run`].
     remarks: fn(&mut Session, &mut [Flowed]) -> Result<String>,
 }
 
-pub const ARMADILLO: MeshFlow = MeshFlow {
+pub const ARMADILLO_FLOW: MeshFlow = MeshFlow {
     program: "armadillo",
     about: "Willmore flow of the armadillo, n = 128, eps = 2^-6, tautilde = 2^-14, with tau = 2^-22 doubled after every step: pictures \
             and Willmore energies at steps 0, 1, 8, 11 and 16",
@@ -40,7 +40,7 @@ pub const ARMADILLO: MeshFlow = MeshFlow {
     remarks: |_, _| Ok(String::new()),
 };
 
-pub const ROCKER_ARM: MeshFlow = MeshFlow {
+pub const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
     program: "rocker_arm",
     about: "Willmore flow of the rocker arm, n = 64, eps = 2^-5, tau = tautilde = 2^-12: pictures and Willmore energies at steps 0, 1 \
             and 20, and the Clifford torus whose phase field is nearest to the last one in L2",
@@ -63,6 +63,7 @@ pub const ROCKER_ARM: MeshFlow = MeshFlow {
     },
     remarks: clifford_tori,
 };
+
 /// What the paper reports for the torus: its distance and its energy.
 const PAPERS_L2: f64 = 3.978e-2;
 const PAPERS_CLIFFORD: f64 = 41.11;

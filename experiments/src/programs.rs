@@ -1,4 +1,5 @@
-//! The programs: a figure of the paper each, or a study of ours, as the help of each says.
+//! The programs: a figure of the paper each, or a study of ours, as the help of each says. Those of one form are in
+//! [`comparison`](crate::comparison) and [`mesh_flow`](crate::mesh_flow).
 
 pub mod calibration;
 pub mod circle_convergence;

@@ -30,6 +30,7 @@ pub fn write<'a, const D: usize>(
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
 ) -> Result<()> {
+    // Without the beginning.
     let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run).skip(1));
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)

@@ -2,7 +2,7 @@
 
 use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{centred_box, scales};
+use crate::surfaces::{centred_box, needed_network, scales};
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,
@@ -116,6 +116,7 @@ impl StorageOptions {
             let case = Case::willmore(CROSS.key, initial, operator, scales, time);
             measured.push(Measured::new(CROSS.key, n, Storage::Bricks, case, session)?);
         }
+        let operator = Chosen::default().learned(Scheme::Accurate, &needed_network())?;
         for n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
@@ -131,8 +132,7 @@ impl StorageOptions {
                 drop(mesh);
                 let first = FIRST_STEP * grid.spacing().powi(4);
                 let time = (StepRule::Doubling(first), steps);
-                let operator = operator(ACCURATE, &grid, &scales)?;
-                let case = Case::willmore(&title, initial, operator, scales, time);
+                let case = Case::willmore(&title, initial, operator.clone(), scales, time);
                 measured.push(Measured::new("armadillo", n, storage, case, session)?);
             }
         }

@@ -1,4 +1,4 @@
-//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions, and their looks.
+//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions, and their colours.
 
 use geometry::contour::zero_level;
 
@@ -169,10 +169,12 @@ impl Study {
     /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
         let planned = |look: &_| self.variants().any(|variant| variant.look() == *look);
-        let methods = looks().filter(planned).map(|(method, scheme)| {
-            let (label, colour) = (method.label_in(scheme), colour(method, scheme));
-            LegendEntry::line(label, colour, LineStyle::Solid)
-        });
+        let methods = methods_in_schemes()
+            .filter(planned)
+            .map(|(method, scheme)| {
+                let (label, colour) = (method.label_in(scheme), colour(method, scheme));
+                LegendEntry::line(label, colour, LineStyle::Solid)
+            });
         let cells = self.cells.iter();
         let resolutions =
             cells.map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
@@ -182,7 +184,7 @@ impl Study {
 }
 
 /// The methods in their schemes, in the order of legends.
-pub fn looks() -> impl Iterator<Item = (Method, Scheme)> {
+pub fn methods_in_schemes() -> impl Iterator<Item = (Method, Scheme)> {
     let schemes = |method| Scheme::ALL.map(|scheme| (method, scheme));
     Method::ALL.into_iter().flat_map(schemes)
 }
@@ -201,7 +203,7 @@ pub fn colour(method: Method, scheme: Scheme) -> usize {
 }
 
 /// The zero level of a phase field.
-pub fn outline(field: &Field<2>) -> Curve {
+pub fn zero_level_curve(field: &Field<2>) -> Curve {
     let curves = zero_level(field).into_iter();
     Curve::new(curves.map(|curve| curve.points).collect::<Vec<_>>())
 }

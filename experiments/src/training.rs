@@ -73,7 +73,6 @@ pub fn held_out_radii(quick: bool) -> usize {
 const LOSS: Format = Format::Scientific(2);
 const TRANSFER: Format = Format::Fixed(5);
 
-/// The quality of networks as columns of a table; its metrics are all fields of [`Quality`].
 const QUALITY: [(&str, Format, fn(&Quality) -> f64); 10] = [
     ("held-out loss", LOSS, |q| q.held_out_loss),
     ("loss of -u", LOSS, |q| q.flipped_loss),
@@ -87,6 +86,7 @@ const QUALITY: [(&str, Format, fn(&Quality) -> f64); 10] = [
     ("radial asymmetry", LOSS, |q| q.radial_asymmetry),
 ];
 
+/// Adds columns with the quality of networks; as metrics they are all fields of [`Quality`].
 pub fn quality<'a, R>(mut sheet: Sheet<'a, R>, of: impl Fn(&'a R) -> &'a Quality) -> Sheet<'a, R> {
     for (head, format, value) in QUALITY {
         sheet = sheet.column(head, format, |row| value(of(row)));

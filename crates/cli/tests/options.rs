@@ -76,7 +76,7 @@ fn what_is_stored_changes_the_cost_and_not_the_flow() {
             "--steps",
             "1",
             "--tau",
-            "1e-8",
+            "1e-6",
         ];
         let options = ["--storage", storage, "--output", storage];
         outcome(folder.path(), &[&shape[..], &options].concat())
@@ -142,12 +142,12 @@ fn flows_end_at_an_energy() {
     let energies = column(&folder.path().join("run"), "willmore_energy");
     let (last, before) = energies.split_last().unwrap();
     assert!(
-        *last <= 16.5 && before.iter().all(|energy| *energy > 16.5),
+        *last <= 16.5 && !before.is_empty() && before.iter().all(|energy| *energy > 16.5),
         "{energies:?}"
     );
 }
 
-/// Of a disc that is small against the interface, whose energy is `pi / R`, each scheme has an energy of its own.
+/// Each scheme has an energy of its own for a disc that is small against the interface; the exact one is `pi / R`.
 #[test]
 fn schemes_are_different_operators() {
     let folder = tempfile::tempdir().unwrap();

@@ -36,7 +36,7 @@ pub fn trajectory(case: &Case<2>, folder: &Path, samples: &Samples) -> Trajector
     .unwrap()
 }
 
-fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
+pub fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
     let interrupt = Interrupt::never();
     let observers: &mut [&mut dyn Observer<2>] = &mut [&mut After(after, &interrupt)];
     let ended = Trajectory::of(
@@ -50,14 +50,8 @@ fn interrupted(case: &Case<2>, folder: &Path, samples: &Samples, after: usize) {
     assert!(ended.unwrap().is_none());
 }
 
-/// The same case, interrupted after so many minimizations and taken up again: its records and its end are the same.
-pub fn resumed(
-    reference: &Trajectory<2>,
-    folder: &Path,
-    samples: &Samples,
-    after: usize,
-) -> Trajectory<2> {
-    interrupted(&reference.case, folder, samples, after);
+/// An interrupted run of the same case to its end: its records and its last field are the same.
+pub fn resumed(reference: &Trajectory<2>, folder: &Path, samples: &Samples) -> Trajectory<2> {
     let resumed = trajectory(&reference.case, folder, samples);
     assert_eq!(without_seconds(&resumed), without_seconds(reference));
     let last = reference.steps();
@@ -93,7 +87,8 @@ fn an_interrupted_run_continues_with_the_same_bytes() {
         let whole = case(flow, method, disc(n, 0.2));
         let reference = trajectory(&whole, &folder("whole"), &samples);
         let twice = folder("interrupted");
-        let resumed = resumed(&reference, &twice, &samples, 2);
+        interrupted(&reference.case, &twice, &samples, 2);
+        let resumed = resumed(&reference, &twice, &samples);
         assert_eq!(reference.records.len(), 4);
         assert_eq!(resumed.start, reference.start);
         for step in [0, 1, 2, 4] {
@@ -167,7 +162,9 @@ fn a_driven_run_continues_with_the_same_bytes() {
     let samples = Samples::every(1);
     let reference = trajectory(&case, &root.path().join("whole"), &samples);
     let folder = root.path().join("interrupted");
-    resumed(&reference, &folder, &samples, 1);
+    interrupted(&reference.case, &folder, &samples, 1);
+    resumed(&reference, &folder, &samples);
+    assert_eq!(reference.steps(), 3);
 }
 
 /// Controlled steps, one of which is refused at first, between marks: the same after an interruption between two of them.
@@ -200,7 +197,9 @@ fn a_controlled_run_continues_with_the_same_bytes() {
     );
     for after in [2, 5] {
         let folder = root.path().join(after.to_string());
-        resumed(&reference, &folder, &samples, after);
+        interrupted(&reference.case, &folder, &samples, after);
+        resumed(&reference, &folder, &samples);
+        assert_eq!(reference.steps(), 2);
     }
 }
 

@@ -96,7 +96,7 @@ fn steps_by_the_energy_grow_and_end_at_the_time() {
     assert!(sizes.iter().any(|size| *size > 4.0 * sizes[0]), "{sizes:?}");
 }
 
-/// Of a square, in steps as long as this control allows.
+/// A finished run of a square, in steps as long as this control allows.
 fn controlled(control: ErrorControl) -> Run<2> {
     let mut case = case(Flow::Willmore, Method::Hybrid, square(128));
     case.scales.newton.tolerance = 1e-3;

@@ -1,7 +1,7 @@
 //! What is stored of a phase field.
 
 use crate::common::{EPS, TAU, case, device, disc, finished, grid, scales};
-use crate::resuming::{resumed, trajectory};
+use crate::resuming::{interrupted, resumed, trajectory};
 use engine::{
     Case, Checkpoints, Error, Flow, Helfrich, Method, Operator, Run, Samples, Scheme, StepRule,
     Stop, Storage, Store,
@@ -64,13 +64,14 @@ fn an_interrupted_run_on_bricks_continues_with_the_same_bytes() {
         assert!(case.initial.nodes().len() < grid(128).len());
         let reference = trajectory(&case, &root.path().join("whole"), &samples);
         let folder = root.path().join("interrupted");
-        let resumed = resumed(&reference, &folder, &samples, 2);
+        interrupted(&case, &folder, &samples, 2);
         let (initial, _) = engine::initial(&RunDirectory::open(&folder).unwrap()).unwrap();
         let same = Case {
             initial,
             ..case.clone()
         };
         assert_eq!(same.identity(&device()), case.identity(&device()));
+        let resumed = resumed(&reference, &folder, &samples);
         let (start, end) = (case.initial.field().unwrap(), resumed.field(4).unwrap());
         let stays = |node: usize| region.as_ref().is_some_and(|moves| !moves[node]);
         let values = end.values().iter().zip(start.values()).enumerate();

@@ -38,7 +38,10 @@ fn impossible_grids_are_refused() {
     assert!(matches!(small, Err(Error::GridTooSmall { cells: 1 })));
     for side in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         for grid in [Grid::<2>::new(8, side), Grid::per_unit(8, side)] {
-            assert!(matches!(grid, Err(Error::InvalidParameter { .. })));
+            assert!(
+                matches!(grid, Err(Error::InvalidParameter { .. })),
+                "{grid:?}"
+            );
         }
     }
     for large in [
@@ -47,7 +50,10 @@ fn impossible_grids_are_refused() {
         Grid::<1>::new(usize::MAX, 1.0).err(),
         Grid::<2>::per_unit(usize::MAX, 1e300).err(),
     ] {
-        assert!(matches!(large, Some(Error::GridTooLarge { .. })));
+        assert!(
+            matches!(large, Some(Error::GridTooLarge { .. })),
+            "{large:?}"
+        );
     }
     let fractional = Grid::<2>::per_unit(3, 0.5);
     assert!(matches!(fractional, Err(Error::FractionalCells { .. })));

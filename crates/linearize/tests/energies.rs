@@ -48,8 +48,7 @@ fn dual_ginzburg_landau<const D: usize>(u: Dual<D>) -> Dual<1> {
     energy
 }
 
-/// Half of the exponent `p`.
-const HALF_P: f64 = 0.75;
+const P: f64 = 1.5;
 
 /// `Σ (δ² + |∇u|²)^(p/2)`
 fn p_laplacian<const D: usize>(u: Tensor<D>) -> Tensor<1> {
@@ -58,7 +57,7 @@ fn p_laplacian<const D: usize>(u: Tensor<D>) -> Tensor<1> {
         let slope = shift(u.clone(), axis) - u.clone();
         norm = norm + slope.clone() * slope;
     }
-    norm.powf_scalar(HALF_P).sum()
+    norm.powf_scalar(P / 2.0).sum()
 }
 
 fn dual_p_laplacian<const D: usize>(u: Dual<D>) -> Dual<1> {
@@ -67,7 +66,7 @@ fn dual_p_laplacian<const D: usize>(u: Dual<D>) -> Dual<1> {
         let slope = u.clone().linear(|t| shift(t, axis)) - u.clone();
         norm = norm + slope.clone() * slope;
     }
-    norm.powf(HALF_P).sum()
+    norm.powf(P / 2.0).sum()
 }
 
 /// Hessian-vector product of a program and by duals.

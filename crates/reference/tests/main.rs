@@ -29,7 +29,7 @@ fn largest_difference<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
     differences.max_by(f64::total_cmp).unwrap_or(0.0)
 }
 
-/// Steps of the classical Runge-Kutta method for `y' = f(y)`.
+/// Integrates `y' = f(y)` by steps of the classical Runge-Kutta method.
 fn integrate<Y: Clone + AsRef<[f64]> + AsMut<[f64]>>(
     mut y: Y,
     (length, steps): (f64, usize),

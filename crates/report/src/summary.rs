@@ -96,6 +96,20 @@ mod tests {
     }
 
     #[test]
+    fn integers_stay_integers() {
+        let mut summary = Summary::default();
+        summary.insert("circle.error_l2", 2.5e-4).unwrap();
+        summary
+            .insert("circle.newton_iterations", 17_usize)
+            .unwrap();
+        let json = serde_json::to_string(&summary).unwrap();
+        assert_eq!(
+            json,
+            r#"{"circle.error_l2":0.00025,"circle.newton_iterations":17}"#
+        );
+    }
+
+    #[test]
     fn the_numbers_of_a_record_are_metrics() {
         #[derive(Serialize)]
         struct Circle {

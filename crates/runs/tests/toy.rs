@@ -95,7 +95,7 @@ pub struct Toy {
 }
 
 impl Toy {
-    /// To the end, as fast as possible.
+    /// A toy that runs to the end without pauses.
     pub fn on(storage: Arc<dyn Storage>) -> Self {
         Self {
             storage,

@@ -281,8 +281,16 @@ fn unusable_input_is_refused_with_its_numbers() {
     let mut field = ball(grid(), RADIUS);
     field.values_mut()[77] = f64::NAN;
     let error = open(&field, fitting);
-    assert!(matches!(error, Error::NonFinite { step: 0, .. }), "{error}");
-    assert!(error.to_string().contains("phase field"), "{error}");
+    assert!(
+        matches!(
+            error,
+            Error::NonFinite {
+                step: 0,
+                field: "phase field"
+            }
+        ),
+        "{error}"
+    );
 
     let field = ball(grid(), RADIUS);
     let mut wide = fitting;
@@ -369,8 +377,16 @@ fn any_step_of_mean_curvature_flow_will_do() {
         .unwrap()
         .advance(tau)
         .unwrap_err();
-    assert!(matches!(error, Error::NonFinite { step: 1, .. }), "{error}");
-    assert!(error.to_string().contains("energy"), "{error}");
+    assert!(
+        matches!(
+            error,
+            Error::NonFinite {
+                step: 1,
+                field: "energy"
+            }
+        ),
+        "{error}"
+    );
 }
 
 #[test]

@@ -12,7 +12,7 @@ fn error(mesh: TriangleMesh) -> Error {
     ClosedMesh::new(mesh).unwrap_err()
 }
 
-/// Of a cube with something wrong.
+/// The error of a cube with one thing wrong.
 fn spoiled(spoil: fn(&mut TriangleMesh)) -> Error {
     let mut mesh = cube(0.5);
     spoil(&mut mesh);

@@ -51,6 +51,7 @@ fn built_in_shapes_have_the_side_that_is_asked_for() {
         };
         assert!((outside - 0.1).abs() < 1e-12, "{name}: {outside}");
     }
+    // Meshes are placed later.
     for name in ["figure", "lever"] {
         assert!(matches!(built_in(name, 0.8).unwrap(), BuiltIn::Mesh(_)));
     }

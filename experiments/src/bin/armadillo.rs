@@ -1,5 +1,5 @@
 //! A scanned figure under Willmore flow with time steps that double.
 
 fn main() -> std::process::ExitCode {
-    experiments::mesh_flow::main(&experiments::mesh_flow::ARMADILLO)
+    experiments::mesh_flow::main(&experiments::mesh_flow::ARMADILLO_FLOW)
 }

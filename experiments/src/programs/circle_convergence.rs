@@ -163,7 +163,7 @@ impl Report {
     fn cost(&self) -> Figure {
         let steps = self.steps;
         let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
-        let shown = study::looks().filter(|&look| own(look).next().is_some());
+        let shown = study::methods_in_schemes().filter(|&look| own(look).next().is_some());
         let curves = shown.map(|(method, scheme)| {
             let cells = own((method, scheme)).map(|e| e.variant.n.to_string());
             let cells: Vec<String> = cells.collect();
@@ -202,6 +202,7 @@ impl Report {
             for circle in &e.circles {
                 circles.extend(self.shown_steps().map(|k| (e, circle, k)));
                 if e.variant.flow == Flow::Willmore {
+                    // Without the beginning.
                     let run = (e.variant, circle.radius);
                     steps.extend(steps::of(run, &circle.trajectory).skip(1));
                 }

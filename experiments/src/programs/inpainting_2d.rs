@@ -127,7 +127,7 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let frame = Curve::new(vec![frame]).with_colour(Colour::Custom(GREEN));
     let panels = shown.into_iter().map(|(name, field)| {
         Shapes::new(name, [[-0.5, 0.5]; 2])
-            .with_curve(study::outline(&field).filled(Colour::LightGrey))
+            .with_curve(study::zero_level_curve(&field).filled(Colour::LightGrey))
             .with_curve(frame.clone().with_width(1.6))
     });
     let title = format!("Inpainting: {}", one.shape.title);

@@ -58,8 +58,8 @@ pub fn program(options: &Options) -> Result<()> {
         .data("kernel", |at| at.kernel)
         .data("heat_kernel", |at| at.heat_kernel);
     session.csv(kernels, "kernels")?;
-    let arguments = |one| arguments().map(move |w| (one, w));
-    let activations: Vec<(&Shown, f64)> = shown.iter().flat_map(arguments).collect();
+    let points = |one| arguments().map(move |w| (one, w));
+    let activations: Vec<(&Shown, f64)> = shown.iter().flat_map(points).collect();
     let activations = Sheet::of(&activations)
         .data("network", |(one, _)| one.spec.name)
         .data("w", |(_, w)| *w)
@@ -131,7 +131,7 @@ struct TransferRow {
     heat: f64,
 }
 
-/// Those of activations in tables and figures.
+/// The arguments `w` at which activations are tabulated and drawn.
 fn arguments() -> impl Iterator<Item = f64> {
     (0..=400).map(|i| -1.0 + f64::from(i) / 200.0)
 }

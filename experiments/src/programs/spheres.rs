@@ -57,7 +57,8 @@ const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
 
 /// Methods and schemes of mean curvature flow.
 fn variants() -> impl Iterator<Item = (Method, Scheme)> {
-    study::looks().filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
+    study::methods_in_schemes()
+        .filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
 }
 
 pub fn program(options: &Options) -> Result<()> {

@@ -64,8 +64,8 @@ pub fn program(options: &Options) -> Result<()> {
     let (names, mut chosen): (Vec<&str>, Vec<_>) =
         all.iter().map(|&spec| (spec.name, spec)).unzip();
     for name in &options.only {
-        let all = names.join(", ");
-        let message = format!("no network is called '{name}'; there are {all}");
+        let listed = names.join(", ");
+        let message = format!("no network is called '{name}'; there are {listed}");
         require(names.contains(&name.as_str()), message)?;
     }
     if !options.only.is_empty() {
@@ -169,9 +169,9 @@ impl Trainings {
                 seed: options.seed,
                 held_out: held_out_radii(options.quick),
             };
-            let key = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
-            let key = key.expect("settings are numbers and names");
-            let mut checkpoint: Checkpoint<R::State> = load(&file, &key).unwrap_or_default();
+            let identity = serde_json::to_value((&training, env!("CARGO_PKG_VERSION")));
+            let identity = identity.expect("settings are numbers and names");
+            let mut checkpoint: Checkpoint<R::State> = load(&file, &identity).unwrap_or_default();
             bar.set_position(checkpoint.curve.len() as u64);
             bar.reset_eta();
             let mut stored = Instant::now();
@@ -180,14 +180,14 @@ impl Trainings {
                 bar.set_position(at.iteration as u64);
                 bar.set_message(format!("{}  {:.2e}", spec.name, at.held_out_loss));
                 if stored.elapsed() >= CHECKPOINT_INTERVAL {
-                    let stores = store(&file, &key, checkpoint);
+                    let stores = store(&file, &identity, checkpoint);
                     stores.map_err(|e| model::Error::Training(e.to_string()))?;
                     stored = Instant::now();
                 }
                 Ok(true)
             };
             let trained = training.run(&mut checkpoint, stage.device, &mut observer)?;
-            store(&file, &key, &checkpoint)?;
+            store(&file, &identity, &checkpoint)?;
             Ok(trained)
         })?;
         let network = trained.network.clone();

@@ -54,8 +54,8 @@ struct Row<'a> {
     surface: TriangleMesh,
 }
 
-/// By how much the volume differs from that of the voxels, the Willmore energy in units of a sphere's, the largest distance from the surface by
-/// marching tetrahedra, and the root of the mean square distance to the shape.
+/// The change of the volume from that of the voxels in percent, the Willmore energy in units of a sphere's, the largest distance from the
+/// surface by marching tetrahedra, and the root of the mean square distance to the shape.
 const COLUMNS: [(&str, Format, &str); 4] = [
     ("volume, %", Fixed(4), "volume"),
     ("w / 8 pi by elements", Fixed(3), "w_over_8pi"),

@@ -16,7 +16,7 @@ pub fn devices() -> Vec<Device> {
     ]
 }
 
-/// Reproducible numbers in `[low, high)`. Those of another generator may lie where an energy here has a kink.
+/// Reproducible numbers in `[low, high)`. Numbers of another generator may lie where an energy here has a kink.
 pub fn numbers(count: usize, seed: u64, low: f64, high: f64) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     (0..count)

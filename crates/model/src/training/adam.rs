@@ -307,7 +307,7 @@ pub fn refine_kernel(kernel: &[f64], dimension: usize, width: usize) -> (Vec<f64
 mod tests {
     use super::*;
     use crate::training::levenberg_marquardt::heat_kernel;
-    use crate::training::tests::{losses_of_resumed, ratios};
+    use crate::training::tests::{ratios, resumes_with_the_same_bytes};
 
     fn data(dimension: usize) -> SphereData {
         SphereData {
@@ -333,7 +333,7 @@ mod tests {
             let mut data = data(dimension);
             data.cells = if dimension == 2 { 32 } else { 16 };
             // Stopped after two epochs of the same schedule.
-            let losses = losses_of_resumed(&params(), &data, 3, 2);
+            let losses = resumes_with_the_same_bytes(&params(), &data, 3, 2);
             assert!(losses[3] < losses[0], "{dimension}D {losses:?}");
         }
     }

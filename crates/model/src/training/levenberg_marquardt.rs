@@ -562,7 +562,7 @@ impl Recipe for LmParams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::tests::{losses_of_resumed, ratios};
+    use crate::training::tests::{ratios, resumes_with_the_same_bytes};
 
     fn data(dimension: usize) -> SphereData {
         SphereData {
@@ -619,7 +619,7 @@ mod tests {
     #[test]
     fn training_lowers_the_loss_and_resumes_with_the_same_bytes() {
         for dimension in [2, 3] {
-            let losses = losses_of_resumed(&params(), &data(dimension), 2, 3);
+            let losses = resumes_with_the_same_bytes(&params(), &data(dimension), 2, 3);
             assert!(
                 losses[losses.len() - 1] < 0.7 * losses[0],
                 "{dimension}D {losses:?}"

@@ -69,8 +69,8 @@ mod tests {
         }
     }
 
-    /// The held-out losses of a training which goes on with the same bytes after it was stopped in this iteration.
-    pub(super) fn losses_of_resumed<R: Recipe>(
+    /// Checks that a training which is stopped in this iteration goes on with the same bytes, and returns its held-out losses.
+    pub(super) fn resumes_with_the_same_bytes<R: Recipe>(
         recipe: &R,
         data: &SphereData,
         seed: u64,

@@ -138,7 +138,7 @@ pub fn together(mut a: TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
     a
 }
 
-/// Every edge once in each direction, without mending anything.
+/// The mesh as a closed one, which must need no mending.
 #[track_caller]
 pub fn closed(mesh: TriangleMesh) -> ClosedMesh {
     let (closed, warnings) = ClosedMesh::new(mesh).unwrap();
@@ -188,7 +188,7 @@ pub fn waves(seed: u64) -> impl Fn(Vector) -> f64 + Sync {
     }
 }
 
-/// Rounded to so many levels per unit; to none with 0.
+/// The value rounded to multiples of `1 / levels`; unchanged for 0.
 pub fn rounded(value: f64, levels: f64) -> f64 {
     if levels > 0.0 {
         (value * levels).round() / levels
