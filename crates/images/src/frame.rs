@@ -14,8 +14,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A raster of so many columns and rows of pixels of side `pixel`, by its upper left corner. Numbers must be finite, `pixel`
-    /// positive, and the size one that [`render::checked_size`] accepts.
+    /// A raster of so many columns and rows of pixels of side `pixel > 0`, by its upper left corner; sizes as in [`render::checked_size`].
     pub fn new(size: [u32; 2], upper_left: [f64; 2], pixel: f64) -> Result<Self, Error> {
         for x in upper_left {
             require("coordinate of the corner", x, "finite", |_| true)?;

@@ -165,8 +165,7 @@ fn policy(script: &str) -> String {
     )
 }
 
-/// A part of a page under a heading of its own. Within another section it is a block behind a line that opens it,
-/// and its name is not used.
+/// A part of a page under a heading of its own. In another section it is a block behind a line that opens it, and has no name.
 #[must_use]
 #[derive(Clone, Debug)]
 pub struct Section {

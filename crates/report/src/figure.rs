@@ -104,8 +104,7 @@ impl Figure {
         self
     }
 
-    /// The figure as an SVG document. Text stays text, in a sans-serif family. Every panel needs something to draw, ranges and arrays that
-    /// fit, and room.
+    /// The figure as an SVG document, in which text stays text. Every panel needs something to draw, ranges and arrays that fit, and room.
     pub fn to_svg(&self) -> Result<String> {
         let layout = self.layout()?;
         Ok(svg::svg(layout.size, |s| self.draw(&layout, s)))
@@ -156,11 +155,7 @@ impl Figure {
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
         let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
-        let shared = if self.shared_legend {
-            joined(&cells)
-        } else {
-            Vec::new()
-        };
+        let shared = (self.shared_legend.then(|| joined(&cells))).unwrap_or_default();
         let legend = Block::new(&shared, fonts.tick, inner);
         let note_top = legend_top + legend.height;
         let height = (note_top + font::height(&self.note, Fonts::NOTE, inner) + PADDING).round();
@@ -261,11 +256,7 @@ struct Cell<'a> {
 impl<'a> Cell<'a> {
     fn new(panel: &'a Panel, fonts: Fonts, text_width: f64, own_legend: bool) -> Result<Self> {
         let content = panel.checked(fonts)?;
-        let legend = if own_legend {
-            content.legend()
-        } else {
-            Vec::new()
-        };
+        let legend = (own_legend.then(|| content.legend())).unwrap_or_default();
         Ok(Self {
             panel,
             content,

@@ -98,15 +98,10 @@ mod tests {
     #[test]
     fn integers_stay_integers() {
         let mut summary = Summary::default();
-        summary.insert("circle.error_l2", 2.5e-4).unwrap();
-        summary
-            .insert("circle.newton_iterations", 17_usize)
-            .unwrap();
+        summary.insert("l2", 2.5e-4).unwrap();
+        summary.insert("newton", 17_usize).unwrap();
         let json = serde_json::to_string(&summary).unwrap();
-        assert_eq!(
-            json,
-            r#"{"circle.error_l2":0.00025,"circle.newton_iterations":17}"#
-        );
+        assert_eq!(json, r#"{"l2":0.00025,"newton":17}"#);
     }
 
     #[test]
