@@ -155,8 +155,8 @@ impl Figure {
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
         let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
-        let shared = (self.shared_legend.then(|| joined(&cells))).unwrap_or_default();
-        let legend = Block::new(&shared, fonts.tick, inner);
+        let shared = self.shared_legend.then(|| joined(&cells));
+        let legend = Block::new(shared.as_deref().unwrap_or_default(), fonts.tick, inner);
         let note_top = legend_top + legend.height;
         let height = (note_top + font::height(&self.note, Fonts::NOTE, inner) + PADDING).round();
         let small = |cell: &Cell<'_>| cell.plot.width.min(cell.plot.height) < SMALLEST_PLOT;
@@ -256,7 +256,7 @@ struct Cell<'a> {
 impl<'a> Cell<'a> {
     fn new(panel: &'a Panel, fonts: Fonts, text_width: f64, own_legend: bool) -> Result<Self> {
         let content = panel.checked(fonts)?;
-        let legend = (own_legend.then(|| content.legend())).unwrap_or_default();
+        let legend = if own_legend { content.legend() } else { vec![] };
         Ok(Self {
             panel,
             content,
