@@ -1,8 +1,8 @@
 //! The harness of the experiments: options, errors, stored partial results, and the runs themselves.
 //!
 //! The [`programs`] read options, call what is here, and write figures, tables and summaries with the `report` crate; the
-//! executables only call them. Numerics live in the library crates; the only computation here is the comparison with
-//! exact solutions.
+//! executables only call them. Numerics live in the library crates; here are comparisons: with exact solutions, finer runs,
+//! other smoothing, and products written by hand.
 //!
 //! # Conventions
 //!
@@ -19,6 +19,7 @@ pub mod comparison;
 pub mod equilibria;
 pub mod harness;
 pub mod inpainting;
+pub mod libraries;
 pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;

@@ -1,6 +1,7 @@
 //! Options common to all programs.
 
-use crate::prelude::*;
+use crate::libraries::*;
+use crate::networks::NetworkOptions;
 
 /// Options of every program.
 #[derive(Args, Clone, Debug)]

@@ -18,6 +18,7 @@ use rustfft::num_complex::Complex;
 use solver::{MinimizingMovement, Objective, Precision};
 
 use crate::prelude::*;
+use crate::timing;
 
 /// `c = tau / tautilde^2` of a typical step: `tau = tautilde = 2^-14`.
 const STIFFNESS: f64 = 16384.0;

@@ -5,7 +5,8 @@ use std::io::Write;
 use report::{Manifest, Summary};
 use runs::Interrupt;
 
-use crate::prelude::*;
+use crate::libraries::*;
+use crate::options::RunOptions;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session {

@@ -2,7 +2,8 @@
 
 use engine::Values;
 
-use crate::prelude::*;
+use crate::libraries::*;
+use crate::session::Session;
 
 /// A step of one of several runs, or its beginning, which has no record.
 pub struct Step<'a, R> {

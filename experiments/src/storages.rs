@@ -3,6 +3,7 @@
 use crate::meshes::{ARMADILLO, Loaded, MeshOptions};
 use crate::prelude::*;
 use crate::surfaces::{centred_box, needed_network, scales};
+use crate::timing;
 use crate::truth::CROSS;
 
 /// Steps on every grid, each twice as long as the one before,

@@ -2,7 +2,9 @@
 
 use geometry::contour::zero_level;
 
-use crate::prelude::*;
+use crate::libraries::*;
+use crate::networks::{Chosen, NetworkOptions, convergence_network, takes_networks};
+use crate::options::{RunOptions, distinct};
 
 /// Options of the studies.
 #[derive(Args, Clone, Debug)]

@@ -17,6 +17,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use toml::{Table, Value};
 
 use crate::cli::Cli;
+use crate::error::one_line;
 use crate::prelude::*;
 
 /// The file of all options, resolved, in the folder of a run.
@@ -92,21 +93,6 @@ pub fn resolved(command: &str, options: &impl Serialize) -> Result<String> {
     let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
     let options = toml::to_string(options).map_err(unwritable)?;
     Ok(format!("{COMMAND} = {command:?}\n{options}"))
-}
-
-/// What clap says, on one line.
-pub fn one_line(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let paragraphs = text.split("\n\n").filter(|p| {
-        !(p.starts_with("Usage") || p.starts_with("For more information") || p.trim().is_empty())
-    });
-    let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
-    let line = words.join(" ");
-    let line = line.strip_prefix("error: ").unwrap_or(&line);
-    line.replace(
-        "invalid digit found in string",
-        "it must be a whole number, not negative",
-    )
 }
 
 fn bad(path: &Path, message: impl AsRef<str>) -> Error {

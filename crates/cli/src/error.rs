@@ -1,7 +1,5 @@
 //! The one error type of the program.
 
-use crate::config::one_line;
-
 /// What can fail as the program does, unless it says otherwise.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -83,4 +81,19 @@ impl Error {
             error => error.into(),
         }
     }
+}
+
+/// What clap says, on one line.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let paragraphs = text.split("\n\n").filter(|p| {
+        !(p.starts_with("Usage") || p.starts_with("For more information") || p.trim().is_empty())
+    });
+    let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
+    let line = words.join(" ");
+    let line = line.strip_prefix("error: ").unwrap_or(&line);
+    line.replace(
+        "invalid digit found in string",
+        "it must be a whole number, not negative",
+    )
 }

@@ -7,6 +7,7 @@ use operators::ComputeDevice;
 use serde_json::{Value, json};
 use solver::FlowParams;
 
+use crate::current::Kept;
 use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
 
 /// A flow with everything that its result depends on, but for the device.
@@ -63,6 +64,13 @@ impl<const D: usize> Case<D> {
     /// The grid.
     pub fn grid(&self) -> &Grid<D> {
         self.initial.grid()
+    }
+
+    pub(crate) fn kept(&self) -> Kept<'_, D> {
+        Kept {
+            initial: &self.initial,
+            region: self.region.as_deref(),
+        }
     }
 
     /// Flow, shape and operator, for titles and messages.

@@ -5,15 +5,20 @@ use std::sync::OnceLock;
 
 use geometry::{Field, Nodes, PhaseField, Stored};
 
-use crate::Case;
-
 /// The current phase field of a run, as it is stored ([`PhaseField`]), or, as a [`Field`], on the whole grid, which is made of it when it is
 /// first asked for. Outside of a region that has the initial values, also where the former has those of the pure phases since nothing is stored.
 pub struct Current<'a, const D: usize> {
-    pub(crate) case: &'a Case<D>,
     /// The initial one before the first step.
     pub(crate) stored: &'a Stored<D>,
+    pub(crate) kept: Kept<'a, D>,
     pub(crate) whole: &'a OnceLock<Field<D>>,
+}
+
+/// What a flow keeps of its initial phase field: the values outside of the region, if there is one.
+#[derive(Clone, Copy)]
+pub(crate) struct Kept<'a, const D: usize> {
+    pub(crate) initial: &'a Stored<D>,
+    pub(crate) region: Option<&'a [bool]>,
 }
 
 impl<'a, const D: usize> Current<'a, D> {
@@ -21,13 +26,13 @@ impl<'a, const D: usize> Current<'a, D> {
     pub(crate) fn field(&self) -> &'a Field<D> {
         let read = |start: usize, part: &mut [f64]| self.read(start, part);
         self.whole.get_or_init(|| {
-            Field::read_from(*self.case.grid(), &read).expect("stored values are finite")
+            Field::read_from(*self.stored.grid(), &read).expect("stored values are finite")
         })
     }
 
     /// Writes the values of the whole grid from a node on, whole rows of bricks.
     pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
-        read(self.case, self.stored, start, part);
+        self.kept.read(self.stored, start, part);
     }
 }
 
@@ -53,30 +58,28 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
     }
 
     fn at(&self, place: [usize; D]) -> f64 {
-        let moves = |region: &Vec<bool>| region[self.case.grid().index(place)];
-        match &self.case.region {
-            Some(region) if !moves(region) => self.case.initial.at(place),
-            _ => self.stored.at(place),
+        let keeps = |region: &[bool]| !region[self.stored.grid().index(place)];
+        if self.kept.region.is_some_and(keeps) {
+            self.kept.initial.at(place)
+        } else {
+            self.stored.at(place)
         }
     }
 }
 
-/// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, and outside of the region the initial ones, which
-/// it keeps even where nothing is stored.
-pub(crate) fn read<const D: usize>(
-    case: &Case<D>,
-    stored: &Stored<D>,
-    start: usize,
-    part: &mut [f64],
-) {
-    stored.read(start, part);
-    if let Some(region) = &case.region {
-        let mut initial = vec![0.0; part.len()];
-        case.initial.read(start, &mut initial);
-        let kept = initial.iter().zip(&region[start..]);
-        for (value, (initial, moves)) in part.iter_mut().zip(kept) {
-            if !moves {
-                *value = *initial;
+impl<const D: usize> Kept<'_, D> {
+    /// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, and outside of the region the initial ones,
+    /// which it keeps even where nothing is stored.
+    pub(crate) fn read(&self, stored: &Stored<D>, start: usize, part: &mut [f64]) {
+        stored.read(start, part);
+        if let Some(region) = self.region {
+            let mut initial = vec![0.0; part.len()];
+            self.initial.read(start, &mut initial);
+            let kept = initial.iter().zip(&region[start..]);
+            for (value, (initial, moves)) in part.iter_mut().zip(kept) {
+                if !moves {
+                    *value = *initial;
+                }
             }
         }
     }

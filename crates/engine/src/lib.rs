@@ -43,10 +43,12 @@
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
+mod advance;
 mod case;
 mod control;
 mod current;
 mod error;
+mod flow;
 mod held;
 mod measure;
 mod motion;
@@ -54,6 +56,7 @@ mod observer;
 mod operator;
 mod record;
 mod run;
+mod step_control;
 mod steps;
 mod stop;
 mod storage;
@@ -65,10 +68,11 @@ pub use case::Case;
 pub use control::ErrorControl;
 pub use current::Current;
 pub use error::Error;
+pub use flow::Flow;
 pub use held::{Held, Target};
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
-pub use operator::{Flow, Method, Operator, Scales, Scheme, quarter_square};
+pub use operator::{Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, to_csv,
     total_hvp,

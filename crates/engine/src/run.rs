@@ -1,4 +1,4 @@
-//! The loop over time steps.
+//! A case that is being computed.
 
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -6,15 +6,14 @@ use std::time::Instant;
 use geometry::measure::{has_interface, l2_distance_of_parts};
 use geometry::{Field, PhaseField, Stored, require};
 use operators::ComputeDevice;
-use runs::Interrupt;
 use serde_json::Value;
 use solver::{FlowState, StepRecord};
 
-use crate::current::read;
 use crate::motion::{self, Motion};
 use crate::record::Values;
-use crate::steps::StepControl;
-use crate::{Case, Current, Error, Event, Flow, Observer, Record, Stop, Store};
+use crate::step_control::StepControl;
+use crate::stop::Progress;
+use crate::{Case, Current, Error, Flow, Measure, Record, Stop};
 
 /// A case that is being computed: its flow, its place in the time steps, and the records so far.
 pub struct Run<const D: usize> {
@@ -32,7 +31,7 @@ pub struct Run<const D: usize> {
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
     /// Whether a step failed after the flow had moved, so that it is not where the last record says.
-    torn: bool,
+    pub(crate) torn: bool,
     ended: Option<Stop>,
 }
 
@@ -44,11 +43,11 @@ impl<const D: usize> Run<D> {
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         case.initial.check_finite()?;
         let initial = Current {
-            case: &case,
             stored: &case.initial,
+            kept: case.kept(),
             whole: &OnceLock::new(),
         };
-        let start = values(&initial, 0.0)?;
+        let start = values(&case.measures, &initial, 0.0)?;
         Self::at(case, device, start, Vec::new(), None)
     }
 
@@ -134,7 +133,7 @@ impl<const D: usize> Run<D> {
             moved,
             travelled,
             minimization: made.minimization,
-            measures: values(&self.current(), time)?,
+            measures: values(&self.case.measures, &self.current(), time)?,
             seconds,
         };
         self.ramped += record.tau / step_size;
@@ -143,57 +142,6 @@ impl<const D: usize> Run<D> {
         self.torn = false;
         self.ended = self.stop(step_size);
         Ok(self.records.last())
-    }
-
-    /// Makes all steps until a stop rule holds, which is returned, or `interrupt` is set, and calls the observers after each. An interrupted
-    /// run can be resumed. With a store, checkpoints are written, the last one also when a step fails; the store is left open, so that files
-    /// can be added to it.
-    ///
-    /// # Errors
-    /// As [`Self::step`], and the errors of observers and of the store.
-    pub fn advance(
-        &mut self,
-        mut store: Option<&mut Store>,
-        observers: &mut [&mut dyn Observer<D>],
-        interrupt: &Interrupt,
-    ) -> Result<Option<Stop>, Error> {
-        if self.records.is_empty() {
-            self.tell(store.as_deref_mut(), observers)?;
-        }
-        loop {
-            if self.ended.is_some() {
-                return Ok(self.ended);
-            }
-            if let Err(error) = self.step() {
-                if let Some(store) = store.filter(|_| !self.torn) {
-                    // What the step says is told, and the checkpoints before this one are there.
-                    let _ = store.commit(self, true);
-                }
-                return Err(error);
-            }
-            self.tell(store.as_deref_mut(), observers)?;
-            let interrupted = interrupt.requested();
-            if let Some(store) = &mut store {
-                store.commit(self, interrupted)?;
-            }
-            if interrupted && self.ended.is_none() {
-                return Ok(None);
-            }
-        }
-    }
-
-    fn tell(
-        &self,
-        store: Option<&mut Store>,
-        observers: &mut [&mut dyn Observer<D>],
-    ) -> Result<(), Error> {
-        let mut event = Event {
-            run: self,
-            directory: store.map(Store::directory),
-        };
-        observers
-            .iter_mut()
-            .try_for_each(|observer| observer.observe(&mut event))
     }
 
     /// A step that succeeds and is short enough.
@@ -291,9 +239,20 @@ impl<const D: usize> Run<D> {
 
     /// The first stop rule that holds, where the last record belongs to a time step of this size.
     fn stop(&self, step_size: f64) -> Option<Stop> {
-        let driven = !self.case.held.is_reached(self.ramped);
-        let mut stops = (self.case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
-        stops.find(|stop| stop.holds(self, step_size)).copied()
+        let case = &self.case;
+        let progress = Progress {
+            records: &self.records,
+            initial: &case.initial,
+            current: self.current(),
+            steps: self.steps(),
+            step_size,
+            largest_step: case.largest_step(),
+            least_energy: case.least_energy(),
+            is_willmore: case.energy.is_willmore(),
+        };
+        let driven = !case.held.is_reached(self.ramped);
+        let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
+        stops.find(|stop| stop.holds(&progress)).copied()
     }
 
     /// The identity of the case, which takes all of its initial values.
@@ -314,8 +273,8 @@ impl<const D: usize> Run<D> {
     /// The phase field at the present time, as it is stored.
     pub fn current(&self) -> Current<'_, D> {
         Current {
-            case: &self.case,
             stored: self.stored(),
+            kept: self.case.kept(),
             whole: &self.whole,
         }
     }
@@ -327,11 +286,11 @@ impl<const D: usize> Run<D> {
 
     /// The `L2` distance of two phase fields of this run.
     fn distance(&self, a: &Stored<D>, b: &Stored<D>) -> f64 {
-        let case = &self.case;
+        let kept = self.case.kept();
         l2_distance_of_parts(
-            case.grid(),
-            &|start, part| read(case, a, start, part),
-            &|start, part| read(case, b, start, part),
+            self.case.grid(),
+            &|start, part| kept.read(a, start, part),
+            &|start, part| kept.read(b, start, part),
         )
     }
 
@@ -409,9 +368,13 @@ fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
 }
 
 /// The measures of a phase field at a time.
-fn values<const D: usize>(now: &Current<'_, D>, time: f64) -> Result<Values, Error> {
+fn values<const D: usize>(
+    measures: &[Measure<D>],
+    now: &Current<'_, D>,
+    time: f64,
+) -> Result<Values, Error> {
     let mut values = Values::new();
-    for measure in &now.case.measures {
+    for measure in measures {
         let measured = measure.of(now, time)?;
         values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
     }

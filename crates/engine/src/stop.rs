@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use derive_more::Display;
-use geometry::PhaseField;
 use geometry::measure::{has_interface, touches_side};
+use geometry::{PhaseField, Stored};
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
 
-use crate::{DISPLACEMENT, Record, Run};
+use crate::{Current, DISPLACEMENT, Record};
 
 /// A reason to end; a flow ends with the first that holds.
 #[derive(Clone, Copy, Debug, PartialEq, Display, Serialize, Deserialize)]
@@ -52,6 +52,23 @@ pub enum Stop {
     AtTheSide,
 }
 
+/// What the rules look at: a flow at its start or after a step.
+pub(crate) struct Progress<'a, const D: usize> {
+    pub(crate) records: &'a [Record],
+    pub(crate) initial: &'a Stored<D>,
+    pub(crate) current: Current<'a, D>,
+    /// Number of completed time steps.
+    pub(crate) steps: usize,
+    /// Size of the time step of the last record.
+    pub(crate) step_size: f64,
+    /// The largest time step by the energy.
+    pub(crate) largest_step: f64,
+    /// What changes of energies below it are measured by.
+    pub(crate) least_energy: f64,
+    /// Whether the energy is the bending energy alone.
+    pub(crate) is_willmore: bool,
+}
+
 /// A step that lowers the energy by less than this fraction counts as almost nothing.
 const LITTLE: f64 = 1e-4;
 /// Number of such steps in a row that end a run.
@@ -63,18 +80,17 @@ impl Stop {
         matches!(self, Self::Motion(_) | Self::EnergyAtRest)
     }
 
-    /// Whether it holds for a run whose last record belongs to a time step of this size.
-    pub(crate) fn holds<const D: usize>(&self, run: &Run<D>, step_size: f64) -> bool {
-        let last = run.records.last();
+    pub(crate) fn holds<const D: usize>(&self, flow: &Progress<'_, D>) -> bool {
+        let last = flow.records.last();
         match *self {
-            Self::Steps(steps) => run.steps() >= steps,
+            Self::Steps(steps) => flow.steps >= steps,
             // What is left of a sum of steps after the last one is rounding.
             Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
             Self::Energy(energy) => {
                 (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
             }
             Self::EnergyRatio(ratio) => {
-                let first = run.records.first().and_then(Record::energy_at_rest);
+                let first = flow.records.first().and_then(Record::energy_at_rest);
                 let last = last.and_then(Record::willmore_energy);
                 (first.zip(last)).is_some_and(|(first, last)| last <= ratio * first)
             }
@@ -83,31 +99,30 @@ impl Stop {
                 gone.is_some_and(|gone| gone >= length)
             }
             Self::Motion(limit) => {
-                last.is_some_and(|r| r.moved * step_size / r.tau <= limit * r.travelled)
+                last.is_some_and(|r| r.moved * flow.step_size / r.tau <= limit * r.travelled)
             }
             Self::EnergyAtRest => {
-                let last = run.records.last_chunk::<IN_A_ROW>();
-                last.is_some_and(|records| records.iter().all(|record| is_at_rest(run, record)))
+                let last = flow.records.last_chunk::<IN_A_ROW>();
+                last.is_some_and(|records| records.iter().all(|record| flow.is_at_rest(record)))
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
-                let bending = run.case.energy.is_willmore();
-                D == 3 && bending && energy.is_some_and(|energy| energy < 4.0 * PI)
+                D == 3 && flow.is_willmore && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
-            Self::Vanished => !has_interface(&run.current()),
-            Self::AtTheSide => is_near_side(&run.current()) && !is_near_side(&run.case.initial),
+            Self::Vanished => !has_interface(&flow.current),
+            Self::AtTheSide => is_near_side(&flow.current) && !is_near_side(flow.initial),
         }
     }
 }
 
-/// Whether a step that is nearly as long as steps by the energy can be changed the energy by almost nothing.
-fn is_at_rest<const D: usize>(run: &Run<D>, record: &Record) -> bool {
-    let change = |made: StepRecord| made.relative_drop(run.case.least_energy()).abs();
-    let is_long = record.tau >= 0.25 * run.case.largest_step();
-    is_long
-        && record
-            .minimization
-            .is_some_and(|made| change(made) < LITTLE)
+impl<const D: usize> Progress<'_, D> {
+    /// Whether a step that is nearly as long as steps by the energy can be changed the energy by almost nothing.
+    fn is_at_rest(&self, record: &Record) -> bool {
+        let change = |made: StepRecord| made.relative_drop(self.least_energy).abs();
+        let is_long = record.tau >= 0.25 * self.largest_step;
+        let made = record.minimization;
+        is_long && made.is_some_and(|made| change(made) < LITTLE)
+    }
 }
 
 /// Whether the shape is within two interface widths of the side of the box.

@@ -69,10 +69,10 @@ mod svg;
 
 pub use distance::interface;
 pub use drawing::drawing;
-pub use error::{Error, FormatError};
+pub use error::{Error, FormatError, LARGEST_IMAGE, LARGEST_OUTLINE};
 pub use frame::Frame;
-pub use image::{Image, LARGEST_IMAGE};
-pub use outline::{LARGEST_OUTLINE, Outline};
+pub use image::Image;
+pub use outline::Outline;
 pub use read::{colours, decode, read};
 pub use selection::{Side, Tones};
 pub use svg::svg;

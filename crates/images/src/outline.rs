@@ -5,10 +5,7 @@ use geometry::measure::BoundingBox;
 use geometry::{Field, Placement, positive, profile_variable};
 use rayon::prelude::*;
 
-use crate::{Error, Image, Side};
-
-/// Largest number of segments of the outline of an image, `2^22`.
-pub const LARGEST_OUTLINE: usize = 1 << 22;
+use crate::{Error, Image, LARGEST_OUTLINE, Side};
 
 /// The outline of a shape: closed polygons, counter-clockwise around insides and clockwise around
 /// holes.

@@ -27,14 +27,14 @@
 //!
 //! `K` is a convolution kernel of odd width `n_K` and `F: R -> R` a perceptron `1-32-16-8-4-2-1` ([`Mlp`]), trained so that
 //! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
-//! 2022; the form used by Rumpf, Sassen and Smoch, eq:mcf_operator_discrete). The operator depends only on the ratios `eps / h` and
+//! 2022; the form used by Rumpf, Sassen and Smoch). The operator depends only on the ratios `eps / h` and
 //! `tautilde / h^2` ([`Ratios`]), so one network serves every grid that has them. [`Networks`]
 //! chooses among the user's and the shipped ones.
 //!
 //! # Training
 //!
 //! [`training::adam`] is the paper's method; [`training::levenberg_marquardt`] minimizes the same loss
-//! (eq:mcf_scheme_optimization_discrete) to its floor in about a minute. The smallest spheres dominate that loss, so it says little without
+//! to its floor in about half a minute. The smallest spheres dominate that loss, so it says little without
 //! its radii: [`Quality`] measures it on two fixed sets. Inside the Willmore scheme a small loss is not enough: see [`calibration`].
 //!
 //! Errors of the device and of the crates below pass through as they are.

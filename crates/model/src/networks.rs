@@ -123,6 +123,17 @@ impl Networks {
     }
 }
 
+impl Shipped {
+    /// The shipped network with these ratios.
+    ///
+    /// # Errors
+    /// [`Error::MissingNetwork`] naming the ratios wanted and those available.
+    pub fn find(self, wanted: Ratios) -> Result<Network, Error> {
+        let named = Networks::default().find(self, &NeededNetwork::exactly(wanted))?;
+        Ok(named.network)
+    }
+}
+
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     stem.to_string_lossy().into_owned()

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Error, NeededNetwork, Network, Networks, Ratios};
+use crate::{Error, Network, Ratios};
 
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
@@ -61,15 +61,6 @@ impl Shipped {
             .iter()
             .map(|(name, data)| Ok((*name, Network::from_bytes(data, Path::new(name))?)))
             .collect()
-    }
-
-    /// The shipped network with these ratios.
-    ///
-    /// # Errors
-    /// [`Error::MissingNetwork`] naming the ratios wanted and those available.
-    pub fn find(self, wanted: Ratios) -> Result<Network, Error> {
-        let named = Networks::default().find(self, &NeededNetwork::exactly(wanted))?;
-        Ok(named.network)
     }
 
     /// Name of the recipe in messages.

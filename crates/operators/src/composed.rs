@@ -241,30 +241,6 @@ pub(crate) fn spectral_filter<const R: usize>(x: Tensor<R>, symbol: Tensor<1>) -
     inverse((re * symbol.clone(), im * symbol), R)
 }
 
-/// Extends an even symbol from the order of [`crate::Transform`]'s spectra, divided by the number of grid points, to all frequencies,
-/// row-major.
-pub(crate) fn full_symbol(dims: &[usize], half: &[f64]) -> Vec<f64> {
-    let (n0, last) = (dims[0], dims[dims.len() - 1]);
-    let total: usize = dims.iter().product();
-    (0..total)
-        .map(|i| {
-            let mirrored = i % last > last / 2;
-            let mut rest = i;
-            let mut place = |n: usize| {
-                let k = rest % n;
-                rest /= n;
-                if mirrored { (n - k) % n } else { k }
-            };
-            let (mut column, mut stride) = (0, 1);
-            for (axis, &n) in dims.iter().enumerate().skip(1).rev() {
-                column += place(n) * stride;
-                stride *= if axis == dims.len() - 1 { n / 2 + 1 } else { n };
-            }
-            half[column * n0 + place(n0)] * total as f64
-        })
-        .collect()
-}
-
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;

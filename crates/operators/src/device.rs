@@ -6,8 +6,6 @@ use std::str::FromStr;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::Error;
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
-use crate::device_check;
 
 /// The backends a device can belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, derive_more::Display)]
@@ -57,7 +55,7 @@ impl DeviceKind {
         Self::ALL.into_iter().filter(|kind| kind.is_compiled())
     }
 
-    fn not_compiled(self) -> Error {
+    pub(crate) fn not_compiled(self) -> Error {
         Error::NotCompiled {
             name: self.name(),
             compiled: compiled_names(),
@@ -100,50 +98,6 @@ pub struct ComputeDevice {
 }
 
 impl ComputeDevice {
-    /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
-    /// seen to get wrong.
-    ///
-    /// # Errors
-    /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
-    pub fn open(kind: DeviceKind) -> Result<Self, Error> {
-        match kind {
-            #[cfg(feature = "flex")]
-            DeviceKind::Flex => Ok(Self::new(kind, Device::flex())),
-            #[cfg(feature = "ndarray")]
-            DeviceKind::NdArray => Ok(Self::new(kind, Device::ndarray())),
-            #[cfg(feature = "wgpu")]
-            DeviceKind::Wgpu => device_check::open_gpu(kind, || {
-                Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)
-            }),
-            #[cfg(feature = "cuda")]
-            DeviceKind::Cuda => device_check::open_gpu(kind, || Device::cuda(0)),
-            #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
-            _ => Err(kind.not_compiled()),
-        }
-    }
-
-    /// The first device compiled in: `flex` unless default features are off.
-    ///
-    /// # Errors
-    /// As [`Self::open`]; [`Error::UnknownDevice`] if no backend was compiled in at all.
-    pub fn default_compiled() -> Result<Self, Error> {
-        let kind = DeviceKind::compiled()
-            .next()
-            .ok_or_else(|| Error::UnknownDevice {
-                name: "default".to_owned(),
-                compiled: "no backend".to_owned(),
-            })?;
-        Self::open(kind)
-    }
-
-    /// The device of this name, or else the first one compiled in.
-    ///
-    /// # Errors
-    /// As [`Self::open`]; [`Error::UnknownDevice`] for a name of no device, and if no backend was compiled in at all.
-    pub fn named(name: Option<&str>) -> Result<Self, Error> {
-        name.map_or_else(Self::default_compiled, |name| Self::open(name.parse()?))
-    }
-
     pub(crate) fn new(kind: DeviceKind, device: Device) -> Self {
         let dtype = if kind.is_cpu() {
             DType::F64

@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex};
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
-use crate::composed::full_symbol;
 use crate::convolution::kernel_symbol;
 use crate::fft::{Real, Transform, is_f64, lock};
 
@@ -108,4 +107,28 @@ impl SpectralFilter {
         *uploaded = Some((device.clone(), dtype, symbol.clone()));
         symbol
     }
+}
+
+/// Extends an even symbol from the order of [`Transform`]'s spectra, divided by the number of grid points, to all frequencies,
+/// row-major.
+fn full_symbol(dims: &[usize], half: &[f64]) -> Vec<f64> {
+    let (n0, last) = (dims[0], dims[dims.len() - 1]);
+    let total: usize = dims.iter().product();
+    (0..total)
+        .map(|i| {
+            let mirrored = i % last > last / 2;
+            let mut rest = i;
+            let mut place = |n: usize| {
+                let k = rest % n;
+                rest /= n;
+                if mirrored { (n - k) % n } else { k }
+            };
+            let (mut column, mut stride) = (0, 1);
+            for (axis, &n) in dims.iter().enumerate().skip(1).rev() {
+                column += place(n) * stride;
+                stride *= if axis == dims.len() - 1 { n / 2 + 1 } else { n };
+            }
+            half[column * n0 + place(n0)] * total as f64
+        })
+        .collect()
 }

@@ -59,6 +59,7 @@ mod filter;
 #[macro_use]
 mod host;
 mod lanes;
+mod open;
 mod ops;
 mod profile;
 mod rules;

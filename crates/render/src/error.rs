@@ -2,7 +2,8 @@
 
 #![allow(missing_docs, reason = "messages and names say it")]
 
-use crate::picture::LARGEST_SIDE;
+/// Largest side of a picture, in pixels.
+pub(crate) const LARGEST_SIDE: u32 = 8192;
 
 /// Errors of scenes and pictures, each with the numbers needed to act on it.
 #[derive(Debug, thiserror::Error)]

@@ -5,9 +5,8 @@ use std::path::Path;
 use files::write_atomically;
 
 use crate::Error;
+use crate::error::LARGEST_SIDE;
 
-/// Largest side of a picture, in pixels.
-pub(crate) const LARGEST_SIDE: u32 = 8192;
 /// How long each picture of an animation is shown, in milliseconds.
 const DELAY: u16 = 200;
 

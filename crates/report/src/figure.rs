@@ -7,12 +7,13 @@ use glam::{DVec2, dvec2};
 
 use crate::bitmap;
 use crate::colour::{GREY, INK};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::font::{self, AIR, Align, LEADING, TextStyle};
 use crate::geom::{Margins, Rect};
 use crate::legend::{Block, LegendEntry};
 use crate::output::OutputDir;
-use crate::panel::{Drawable, Panel};
+use crate::panel::Panel;
 use crate::style::Fonts;
 use crate::surface::Surface;
 use crate::svg;

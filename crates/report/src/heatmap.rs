@@ -5,9 +5,9 @@ use srgb::Rgb;
 use crate::axes::{Axes, Ruler};
 use crate::axis::{Axis, Window, narrowest};
 use crate::colour::{FRAME, viridis};
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Rect};
-use crate::panel::Drawable;
 use crate::style::Fonts;
 use crate::surface::Surface;
 

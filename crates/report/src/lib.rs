@@ -51,6 +51,7 @@ mod axes;
 mod axis;
 mod bitmap;
 mod colour;
+mod drawable;
 mod encode;
 mod error;
 mod figure;

@@ -5,10 +5,10 @@ use glam::DVec2;
 use crate::axes::Axes;
 use crate::axis::{Axis, Window};
 use crate::colour::Colour;
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::{Margins, Rect, clip_polyline, thin};
 use crate::legend::LegendEntry;
-use crate::panel::Drawable;
 use crate::style::{Fonts, LineStyle, Marker};
 use crate::surface::Surface;
 

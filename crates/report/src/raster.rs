@@ -2,9 +2,9 @@
 
 use srgb::Rgb;
 
+use crate::drawable::Drawable;
 use crate::error::{Error, Result};
 use crate::geom::Rect;
-use crate::panel::Drawable;
 use crate::surface::{PNG_SCALE, Surface};
 
 /// A panel that shows a picture, with a caption below, which may be empty.

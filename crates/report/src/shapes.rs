@@ -5,9 +5,9 @@ use srgb::Rgb;
 
 use crate::axis::Window;
 use crate::colour::Colour;
+use crate::drawable::Drawable;
 use crate::error::Result;
 use crate::geom::{Rect, clip_loop, clip_polyline, thin};
-use crate::panel::Drawable;
 use crate::surface::Surface;
 
 /// Closed polylines drawn alike, such as all components of one zero level set.

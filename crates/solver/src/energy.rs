@@ -6,22 +6,9 @@ use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
 use model::{BrickOperator, MeanCurvatureOperator};
 use operators::{ComputeDevice, spectral_filter};
-use serde::{Deserialize, Serialize};
 
 use crate::error::StepFailure;
-use crate::{Error, HelfrichTerms, PhaseInverse};
-
-/// Precision of the linear solves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Precision {
-    /// Hessian-vector products and vectors of conjugate gradients in single precision, if the step allows it: half the cost, and
-    /// the same iterations. Energies, gradients and phase fields keep the precision of the device.
-    #[default]
-    Single,
-    /// Everything in the precision of the device.
-    Device,
-}
+use crate::{Error, HelfrichTerms, PhaseInverse, Precision};
 
 /// A step of mean curvature flow, `v[u]`, as the energy sees it.
 ///

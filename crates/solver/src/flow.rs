@@ -4,19 +4,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Field, Grid, PhaseField, Stored, positive};
-use model::{Factors, MeanCurvatureOperator, Network, Ratios, SeparableOperator};
+use geometry::{Bricks, Field, Grid, PhaseField, Stored};
+use model::{MeanCurvatureOperator, Network, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
 
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
-use crate::newton::{NewtonInfo, NewtonParams, minimize_timed};
+use crate::newton::{NewtonInfo, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, Error, Exit, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
+    Accuracy, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep,
+    MinimizingMovement,
 };
 
 mod bricks;
@@ -25,57 +26,6 @@ mod start;
 
 pub use second_order::StepEstimates;
 pub use start::{Start, StartKind};
-
-/// Scales of a flow.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FlowParams {
-    /// Interface width `eps`.
-    pub eps: f64,
-    /// Inner time step `tautilde` of the mean curvature flow.
-    pub mcf_step: f64,
-    /// Settings of the minimization.
-    pub newton: NewtonParams,
-    /// What the energy is divided by, term by term: [`Factors::PAPER`] for the scheme of the paper, those of the step's
-    /// calibration for a flow with the speed of Willmore flow. Mean curvature flow does not look at it.
-    #[serde(default)]
-    pub calibration: Factors,
-}
-
-impl FlowParams {
-    /// The scheme of the paper with these scales, and the default minimization.
-    pub fn paper(eps: f64, mcf_step: f64) -> Self {
-        let newton = NewtonParams::default();
-        Self {
-            eps,
-            mcf_step,
-            newton,
-            calibration: Factors::PAPER,
-        }
-    }
-
-    /// The network ratios that a grid needs with these scales.
-    pub fn ratios<const D: usize>(&self, grid: &Grid<D>, width: usize) -> Ratios {
-        Ratios::of_run(D, width, grid.spacing(), self.eps, self.mcf_step)
-    }
-
-    fn validate(&self) -> Result<(), Error> {
-        self.newton.validate()?;
-        for (name, value) in [
-            ("eps", self.eps),
-            ("tautilde", self.mcf_step),
-            ("calibration.energy", self.calibration.energy),
-            ("calibration.metric", self.calibration.metric),
-        ] {
-            positive(name, value)?;
-        }
-        Ok(())
-    }
-
-    /// `tau m / (c tautilde^2)`, the weight of the curvature against the motion in a time step of size `tau`.
-    pub fn stiffness(&self, tau: f64) -> f64 {
-        tau / (self.calibration.speed() * self.mcf_step * self.mcf_step)
-    }
-}
 
 /// One time step of Willmore flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

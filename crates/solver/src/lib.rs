@@ -52,6 +52,7 @@ mod flow;
 mod helfrich;
 mod interface;
 mod newton;
+mod params;
 mod preconditioner;
 mod region;
 mod samples;
@@ -60,15 +61,15 @@ mod stored;
 mod times;
 
 pub use constraints::Constraints;
-pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective, Precision};
+pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
 pub use error::{Error, StepFailure};
 pub use flow::{
-    FlowParams, FlowState, MeanCurvatureFlow, Start, StartKind, StepEstimates, StepRecord,
-    WillmoreFlow,
+    FlowState, MeanCurvatureFlow, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow,
 };
 pub use helfrich::{Helfrich, HelfrichTerms};
 pub use model::Factors;
-pub use newton::{Exit, Method, NewtonInfo, NewtonParams, minimize};
+pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
+pub use params::{FlowParams, Method, NewtonParams, Precision};
 pub use preconditioner::PhaseInverse;
 pub use times::PhaseTimes;

@@ -6,7 +6,6 @@
 use std::cell::Cell;
 
 use burn::tensor::Tensor;
-use geometry::require;
 use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
@@ -15,91 +14,7 @@ use crate::constraints::{Held, Place, Tangent};
 use crate::preconditioner::{Level, Preconditioner};
 use crate::region::Region;
 use crate::times::{PhaseTimes, timed};
-use crate::{Error, Objective, Precision};
-
-/// Which minimization.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Preconditioned Newton-CG with profile-preserving updates and cleanup.
-    #[default]
-    Preconditioned,
-    /// Plain Newton-CG with Armijo line search along straight lines.
-    Paper,
-}
-
-/// Settings of the minimization.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NewtonParams {
-    /// The method.
-    pub method: Method,
-    /// Stop when the Newton decrement says that the minimizer is nearer than this fraction of the motion
-    /// `u - u_k` (root mean squares).
-    pub tolerance: f64,
-    /// Reduction of the residual in each linear solve, in the norm of the preconditioner.
-    pub cg_tolerance: f64,
-    /// Linear solves end sooner where the residual says that they are nearer to their solution than this fraction of the motion.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub linear_accuracy: Option<f64>,
-    /// Limit of linear iterations per Newton step.
-    pub cg_iterations: usize,
-    /// Limit of Newton steps.
-    pub newton_iterations: usize,
-    /// Linear iterations of one cleanup.
-    pub cleanup_iterations: usize,
-    /// Precision of the linear solves.
-    pub precision: Precision,
-}
-
-impl Default for NewtonParams {
-    fn default() -> Self {
-        Self {
-            method: Method::Preconditioned,
-            tolerance: 0.02,
-            cg_tolerance: 0.1,
-            linear_accuracy: None,
-            cg_iterations: 600,
-            newton_iterations: 60,
-            cleanup_iterations: 4,
-            precision: Precision::default(),
-        }
-    }
-}
-
-impl NewtonParams {
-    /// For steps of second order, whose minimizations are short and begin near their ends: few linear solves that leave all the same, since
-    /// what the minimizations leave enters the [estimated error](crate::StepEstimates), and adds up where steps are long.
-    pub fn second_order() -> Self {
-        Self {
-            tolerance: 0.03,
-            cg_tolerance: 0.1,
-            linear_accuracy: Some(0.003),
-            newton_iterations: 20,
-            ..Self::default()
-        }
-    }
-
-    /// Checks the ranges.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] naming the first bad one.
-    pub fn validate(&self) -> Result<(), Error> {
-        for (name, value) in [
-            ("tolerance", self.tolerance),
-            ("cg_tolerance", self.cg_tolerance),
-            ("linear_accuracy", self.linear_accuracy.unwrap_or(0.5)),
-        ] {
-            require(name, value, "between 0 and 1", |v| v > 0.0 && v < 1.0)?;
-        }
-        for (name, value) in [
-            ("cg_iterations", self.cg_iterations),
-            ("newton_iterations", self.newton_iterations),
-        ] {
-            require(name, value as f64, "at least 1", |v| v >= 1.0)?;
-        }
-        Ok(())
-    }
-}
+use crate::{Error, Method, NewtonParams, Objective};
 
 /// Why a minimization ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

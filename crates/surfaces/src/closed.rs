@@ -83,7 +83,7 @@ impl ClosedMesh {
         warnings.extend((vertices > 0).then_some(Warning::Unreferenced(vertices)));
 
         let bounds = mesh.bounding_box().ok_or(Error::NoFaces)?;
-        let (area, volume) = (area(&mesh), volume(&mesh, &mesh.faces));
+        let (area, volume) = (area(&mesh), mesh.volume());
         // The sum of the volumes is exact to a few units in the last place of this product.
         let rounding = 1e-14 * area * bounds.longest_side();
         if volume.abs() <= rounding {
@@ -121,7 +121,7 @@ impl ClosedMesh {
     /// Enclosed volume, cavities subtracted: `1/6 sum of a . (b x c)` over the faces (divergence
     /// theorem).
     pub fn volume(&self) -> f64 {
-        volume(&self.mesh, &self.mesh.faces)
+        self.mesh.volume()
     }
 
     /// Euler characteristic `V - E + F`, the sum of `2 - 2 g` over the components.
@@ -154,7 +154,7 @@ impl ClosedMesh {
     /// As [`ClosedMesh::new`].
     pub fn without_small_parts(&self, least: f64) -> Result<Self, Error> {
         let mut parts = Seams::find(&self.mesh)?.parts(&self.mesh);
-        parts.retain(|faces| volume(&self.mesh, faces).abs() >= least);
+        parts.retain(|faces| self.mesh.volume_behind(faces).abs() >= least);
         if parts.is_empty() {
             return Ok(self.clone());
         }
@@ -226,21 +226,6 @@ fn area(mesh: &TriangleMesh) -> f64 {
     0.5 * twice.sum::<f64>()
 }
 
-/// Signed volume behind some of the faces.
-pub(crate) fn volume<'a>(
-    mesh: &TriangleMesh,
-    faces: impl IntoIterator<Item = &'a [u32; 3]>,
-) -> f64 {
-    // From a point close by, so that far-away meshes do not lose digits.
-    let origin = mesh.vertices.first().copied().unwrap_or_default();
-    let origin = Vector::from_array(origin);
-    let sixfold = faces.into_iter().map(|&face| {
-        let [a, b, c] = mesh.corners(face).map(|x| x - origin);
-        a.dot(b.cross(c))
-    });
-    sixfold.sum::<f64>() / 6.0
-}
-
 /// Components must be enclosed by as many others as their orientation says.
 fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
     if seams.components < 2 {
@@ -262,7 +247,7 @@ fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
             seen.sum::<f64>()
         });
         let winding = angle.sum::<f64>() / (4.0 * std::f64::consts::PI);
-        let outwards = volume(mesh, &parts[this]) > 0.0;
+        let outwards = mesh.volume_behind(&parts[this]) > 0.0;
         let expected = i64::from(!outwards);
         // Where components touch, the winding number is not whole and tells nothing.
         if (winding - winding.round()).abs() > 0.01 || winding.round() as i64 == expected {

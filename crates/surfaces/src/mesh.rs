@@ -95,7 +95,19 @@ impl TriangleMesh {
 
     /// The volume that a closed surface encloses, `1/6 sum a . (b x c)`.
     pub fn volume(&self) -> f64 {
-        crate::closed::volume(self, &self.faces)
+        self.volume_behind(&self.faces)
+    }
+
+    /// Signed volume behind some of the faces.
+    pub(crate) fn volume_behind<'a>(&self, faces: impl IntoIterator<Item = &'a [u32; 3]>) -> f64 {
+        // From a point close by, so that far-away meshes do not lose digits.
+        let origin = self.vertices.first().copied().unwrap_or_default();
+        let origin = Vector::from_array(origin);
+        let sixfold = faces.into_iter().map(|&face| {
+            let [a, b, c] = self.corners(face).map(|x| x - origin);
+            a.dot(b.cross(c))
+        });
+        sixfold.sum::<f64>() / 6.0
     }
 
     /// Outward unit normals of the vertices: the sums of the unit normals of the faces there, weighted by their angles; zero for

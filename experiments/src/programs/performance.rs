@@ -1,6 +1,6 @@
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
-use crate::{products, surfaces};
+use crate::{products, surfaces, timing};
 use geometry::shapes::Capsule;
 
 /// Steps of a comparison with a smaller tolerance, and how much smaller.

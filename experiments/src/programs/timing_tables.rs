@@ -1,6 +1,6 @@
 use crate::meshes::{ARMADILLO, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces;
+use crate::{surfaces, timing};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
