@@ -93,11 +93,11 @@ pub enum RunCommand {
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
   willmore flow builtin:ring --tension 4 --steps 12
 Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
-The Willmore energy is 1/2 int h^2 dA in space, h the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
+The Willmore energy is 1/2 int H^2 dA in space, H the sum of the principal curvatures (a sphere has 8 pi, no closed surface less),
 and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).
 Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.")]
     Flow(FlowOptions),
-    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or the voxels off a segmentation
+    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or make a smooth mesh of a segmentation
     #[command(after_help = "Examples:
   willmore fair scan.stl --save smooth.stl
   willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
@@ -133,7 +133,8 @@ pub struct InputOptions {
     /// or - for standard input
     pub input: Option<String>,
 
-    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; of a mesh, image or volume the first that hold its thin parts]
+    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; those of a field; for a mesh, image or volume the coarsest of a few that
+    /// holds its thin parts]
     #[arg(long, value_name = "N")]
     pub cells: Option<usize>,
 
@@ -206,7 +207,7 @@ pub struct SchemeOptions {
     pub network: Option<PathBuf>,
 
     /// What of the phase field is stored: dense, the whole grid; bricks, what is near the surface; auto, bricks where they are less than half of
-    /// the grid; finite elements and the paper's networks always take the whole grid [default: auto]
+    /// the grid; mean curvature flow, finite elements and the paper's networks always take the whole grid [default: auto]
     #[arg(long, value_name = "WHAT", value_enum, hide_possible_values = true)]
     pub storage: Option<Storage>,
 }
@@ -243,7 +244,7 @@ pub struct MessageOptions {
     #[arg(long, global = true)]
     pub quiet: bool,
 
-    /// Print the outcome as one JSON object, with --label all one for each label
+    /// Print the outcome as JSON: one object, with --label all one for each label; the networks as an array
     #[arg(long, global = true)]
     pub json: bool,
 
@@ -324,8 +325,8 @@ pub struct FlowOptions {
     #[arg(long, value_name = "TARGET")]
     pub volume: Option<SizeTarget>,
 
-    /// Hold the area of the surface (the length of a plane curve): keep, VALUE, or PERCENT, as 105%. Edges sharper
-    /// than the interface become round first, and the area comes back over the ramp
+    /// Hold the area of the surface (the length of a plane curve): keep, VALUE, or PERCENT, as 105%. With `flow`, edges
+    /// sharper than the interface become round first, and the area comes back over the ramp
     #[arg(long, value_name = "TARGET")]
     pub area: Option<SizeTarget>,
 
@@ -338,7 +339,7 @@ pub struct FlowOptions {
     #[arg(long, value_name = "STEPS")]
     pub ramp: Option<usize>,
 
-    /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (h - c0)^2 dA, h the sum of the principal
+    /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (H - c0)^2 dA, H the sum of the principal
     /// curvatures, positive for a ball [default: 0]
     #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true)]
     pub spontaneous_curvature: Option<f64>,
@@ -406,12 +407,12 @@ pub struct InpaintOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// The region that is filled: an image of the size of the input (its opaque pixels if some are not, else the dark ones, or the light ones if
+    /// The region that is filled: an image of the size of the input, or a square for the box of another input (its opaque pixels if some are not, else the dark ones, or the light ones if
     /// most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub mask: Option<String>,
 
-    /// What the region holds at the beginning: keep, empty, full, or a shape like the mask
+    /// What the region holds at the beginning: keep, empty, full, or a region as box:... or ball:...
     #[arg(long, value_name = "SHAPE", default_value = "keep")]
     pub ansatz: Ansatz,
 }
@@ -498,7 +499,7 @@ pub struct CheckOptions {
 
 #[derive(Args, Clone, Debug)]
 pub struct TrainOptions {
-    /// Dimension of space, 2 or 3; it must be given, as --width, --eps-over-h and --save
+    /// Dimension of space, 2 or 3; required, like --width, --eps-over-h and --save
     #[arg(long, value_name = "D")]
     pub dimension: Option<usize>,
 
