@@ -117,14 +117,10 @@ impl<const D: usize> Case<D> {
 
     /// The time at which the flow ends, if there is one.
     pub(crate) fn end(&self) -> Option<f64> {
-        let ends = self.stops.iter().filter_map(|stop| match stop {
-            Stop::Time(end) => Some(*end),
-            _ => None,
-        });
-        ends.reduce(f64::min)
+        Stop::end(&self.stops)
     }
 
-    /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums.
+    /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums, and measures by their names.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
         let (mut initial, mut row) = (Sha256::default(), vec![0.0; grid.cells()]);
@@ -150,6 +146,7 @@ impl<const D: usize> Case<D> {
         });
         if !self.energy.is_willmore() {
             identity["energy"] = json!(self.energy);
+            identity["response"] = json!(self.operator.response);
         }
         if !self.held.is_empty() {
             identity["held"] = json!(self.held);

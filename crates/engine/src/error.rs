@@ -12,10 +12,14 @@ pub enum Error {
     )]
     ReducedVolume { target: f64, present: f64 },
     #[error(
-        "only a ball has a reduced volume of {reduced_volume:.5}, so that nothing could move: hold one of the two sizes, or a smaller reduced \
-         volume"
+        "no other shape of this volume has so small a surface (reduced volume {reduced_volume:.5}), so that nothing could move: hold one of the \
+         two sizes, or a smaller reduced volume"
     )]
-    OnlyBall { reduced_volume: f64 },
+    Roundest { reduced_volume: f64 },
+    #[error(
+        "{case}: the step before failed after the flow had moved: go on from the last checkpoint"
+    )]
+    Torn { case: String },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {

@@ -1,13 +1,13 @@
 //! Perimeter and volume held, or driven to targets.
 
-use geometry::zero_set::reduced_volume;
-use geometry::{PhaseField, ZeroSet};
+use geometry::zero_set::{least_perimeter, reduced_volume};
+use geometry::{Grid, PhaseField, ZeroSet};
 use serde::{Deserialize, Serialize};
 use solver::Constraints;
 
 use crate::Error;
 
-/// The reduced volume of balls, as they are measured, is 1 up to this.
+/// The reduced volume of balls, as they are measured, is 1 up to this; for shapes through the box it is taken with respect to theirs.
 const ROUND: f64 = 1e-4;
 
 /// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
@@ -103,13 +103,15 @@ impl Held {
         self.at(f64::INFINITY)
     }
 
-    /// Refuses perimeter and volume of a ball together. What no shape has is refused by [`solver::WillmoreFlow::constrain`].
-    pub(crate) fn check(&self, dimension: usize) -> Result<(), Error> {
+    /// Refuses perimeter and volume of a ball together, or of another shape with the [least perimeter](least_perimeter) in the box. What no
+    /// shape has is refused by [`solver::WillmoreFlow::constrain`].
+    pub(crate) fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         let targets = self.targets();
         if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {
-            let reduced_volume = reduced_volume(dimension, perimeter, volume);
-            if reduced_volume > 1.0 - ROUND {
-                return Err(Error::OnlyBall { reduced_volume });
+            let part = least_perimeter(grid, volume) / perimeter;
+            if part.powf(D as f64 / (D as f64 - 1.0)) > 1.0 - ROUND {
+                let reduced_volume = reduced_volume(D, perimeter, volume);
+                return Err(Error::Roundest { reduced_volume });
             }
         }
         Ok(())
@@ -183,7 +185,7 @@ mod tests {
             perimeter: Some(Target::keep(perimeter)),
             volume: Some(Target::keep(volume)),
         };
-        held.check(D)
+        held.check(&grid)
     }
 
     #[test]
@@ -199,9 +201,17 @@ mod tests {
             check_kept(&ball, 64),
         ] {
             let error = refused.unwrap_err();
-            assert!(matches!(error, Error::OnlyBall { .. }), "{error}");
+            assert!(matches!(error, Error::Roundest { .. }), "{error}");
         }
         check_kept(&Ellipse::new([0.3, 0.28]).unwrap(), 64).unwrap();
+        // Of a band through the box both can be held where it is wavy; a straight one has the least length.
+        let grid = Grid::<2>::centred(32, 1.0).unwrap();
+        let band = |length: f64| Held {
+            perimeter: Some(Target::keep(length)),
+            volume: Some(Target::keep(0.5)),
+        };
+        assert!(band(2.0).check(&grid).is_err());
+        band(2.1).check(&grid).unwrap();
         let rod = Capsule::new([-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], 0.25).unwrap();
         check_kept(&rod, 32).unwrap();
     }

@@ -129,7 +129,7 @@ impl<const D: usize> SolverFlow<D> {
                 }
                 // What no shape has is refused before the first step: the targets, and sizes on the way to them.
                 flow.constrain(case.held.targets())?;
-                case.held.check(D)?;
+                case.held.check(case.grid())?;
                 for step in 1..=case.held.steps() {
                     flow.constrain(case.held.at(step as f64))?;
                 }

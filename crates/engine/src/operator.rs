@@ -276,6 +276,9 @@ impl Operator {
             "half_grids": self.half_grids,
             "network": self.network().map(network),
         });
+        if self.linear != LinearSolver::default() {
+            identity["linear"] = json!(format!("{:?}", self.linear));
+        }
         if self.storage != Storage::Dense {
             identity["storage"] = json!(self.storage);
         }

@@ -8,7 +8,7 @@ use solver::StepRecord;
 /// Values of the measures of a case by their names; those that a shape does not have are absent.
 pub type Values = BTreeMap<String, f64>;
 
-/// One minimization of Willmore flow, or one step of mean curvature flow: a time step or a substep of one.
+/// A time step or a substep of one: a minimization of Willmore flow, two for steps of second order, or a step of mean curvature flow.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Number of the time step to which it belongs, from 1.
@@ -83,7 +83,7 @@ pub fn energy_increases(records: &[Record]) -> usize {
 pub(crate) const ESTIMATES_MISS: f64 = 1.35;
 
 /// The estimated time error of second-order steps at the end of the last of them, largest over the interface; none before the first
-/// [estimate](solver::StepEstimates).
+/// [estimate](solver::StepEstimates), and where nothing is left that moves.
 ///
 /// The flow does not depend on time: what a step is late lasts. So the local error `e_k` of a step in which the interface moves at the rate
 /// `F_k` is taken for a delay, and all of them count at the present rate, `1.35 F_n sum_k e_k / F_k`. Their plain sum would not see that shapes forget
@@ -97,7 +97,7 @@ pub fn estimated_time_error(records: &[Record]) -> Option<f64> {
             delay = Some(delay.unwrap_or(0.0) + error / rate);
         }
     }
-    Some(ESTIMATES_MISS * delay? * rate)
+    (rate > 0.0).then_some(ESTIMATES_MISS * delay? * rate)
 }
 
 /// All Hessian-vector products.
@@ -105,7 +105,7 @@ pub fn total_hvp(records: &[Record]) -> f64 {
     records.iter().filter_map(Record::hvp).sum()
 }
 
-/// Hessian-vector products per minimization.
+/// Hessian-vector products per record, those of steps that were too long included.
 pub fn mean_hvp(records: &[Record]) -> f64 {
     total_hvp(records) / records.len().max(1) as f64
 }

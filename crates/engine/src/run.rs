@@ -7,7 +7,7 @@ use geometry::measure::{has_interface, l2_distance_of_parts};
 use geometry::{Field, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
-use solver::{FlowState, StepRecord};
+use solver::{FlowState, StepRecord, widths_between};
 
 use crate::motion::{self, Motion};
 use crate::record::Values;
@@ -105,10 +105,15 @@ impl<const D: usize> Run<D> {
     /// Makes one step: a minimization of the next size, halved if it fails and the rule allows that. None once a stop rule holds.
     ///
     /// # Errors
-    /// [`Error::Step`], [`Error::TooStiff`]: the run stays where it was. After errors of measures it goes on from its last checkpoint only.
+    /// [`Error::Step`], [`Error::TooStiff`]; errors of measures, and where the result is not finite, after which the run goes on from its last
+    /// checkpoint only, as [`Error::Torn`] says.
     pub fn step(&mut self) -> Result<Option<&Record>, Error> {
         if self.ended.is_some() {
             return Ok(None);
+        }
+        if self.torn {
+            let case = self.case.title();
+            return Err(Error::Torn { case });
         }
         let clock = Instant::now();
         self.whole.take();
@@ -147,8 +152,9 @@ impl<const D: usize> Run<D> {
     /// A step that succeeds and is short enough.
     fn attempt(&mut self) -> Result<Attempt, Error> {
         let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
+        let shorter_by = self.control.shorter_by();
         if !self.case.held.is_empty() {
-            most = most.max(SHORTER);
+            most = most.max(shorter_by);
         }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let longest = self.case.steps.longest_move;
@@ -159,7 +165,7 @@ impl<const D: usize> Run<D> {
             .last()
             .filter(|last| longest.is_some() && last.halvings > 0);
         let longer = |last: &Record| if last.far { 1.5 } else { 2.0 };
-        while last.is_some_and(|last| size > longer(last) * last.tau) && halvings < SHORTER {
+        while last.is_some_and(|last| size > longer(last) * last.tau) && halvings < shorter_by {
             size *= 0.5;
             halvings += 1;
         }
@@ -180,7 +186,7 @@ impl<const D: usize> Run<D> {
                         (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
                         _ => 0.0,
                     };
-                    let too_far = part > 1.0 && halvings < SHORTER;
+                    let too_far = part > 1.0 && halvings < shorter_by;
                     let Some((state, _)) = before.as_ref().filter(|_| too_far) else {
                         return Ok(Attempt {
                             halvings,
@@ -215,8 +221,8 @@ impl<const D: usize> Run<D> {
         }
     }
 
-    /// How many of its widths the interface has moved in the step that was just made, also to where there was none; infinitely many if it is
-    /// away altogether.
+    /// How many of its widths the interface has moved in the step that was just made, also to where there was none ([`widths_between`]); infinitely
+    /// many if it is away altogether.
     fn has_gone(&self, before: &Stored<D>) -> Result<f64, Error> {
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
         if !has_interface(&now) {
@@ -345,28 +351,8 @@ struct Attempt {
     minimization: Option<StepRecord>,
 }
 
-/// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
-const SHORTER: u32 = 12;
 /// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
 const FAR: f64 = 0.6;
-/// The part of the interface that may move further: that of parts that vanish.
-const VANISHING: f64 = 0.02;
-
-/// How many widths all but the part of the interface that may vanish has moved: where `u = tanh(3 s / (4 eps))` changes its sign, the other
-/// phase field says how far its own interface is.
-fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
-    let mut sizes = other.where_zero(u);
-    for size in &mut sizes {
-        *size = size.abs().min(1.0);
-    }
-    let vanishing = (VANISHING * sizes.len() as f64) as usize;
-    if vanishing >= sizes.len() {
-        return 0.0;
-    }
-    let (_, size, _) = sizes.select_nth_unstable_by(vanishing, |a, b| b.total_cmp(a));
-    size.atanh() / 0.75
-}
-
 /// The measures of a phase field at a time.
 fn values<const D: usize>(
     measures: &[Measure<D>],

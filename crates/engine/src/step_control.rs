@@ -12,6 +12,8 @@ const LITTLE: f64 = 0.1;
 const MUCH: f64 = 0.3;
 /// How often a step by the energy is halved before the run gives up.
 const HALVINGS: u32 = 24;
+/// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
+const SHORTER: u32 = 12;
 
 /// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
 /// [accepting](Self::accept) them again restores it.
@@ -112,6 +114,12 @@ impl StepControl {
             _ if self.controller.is_some() => HALVINGS,
             _ => 0,
         }
+    }
+
+    /// How often it may be halved where the interface moves too far, or what is held cannot be: substeps no further than where they end.
+    pub(crate) fn shorter_by(&self) -> u32 {
+        self.substeps
+            .map_or(SHORTER, |substeps| substeps.halvings())
     }
 
     pub(crate) fn step(&self) -> usize {

@@ -78,12 +78,11 @@ impl StepRule {
 pub struct TimeSteps {
     /// The rule for the sizes of the steps.
     pub rule: StepRule,
-    /// The largest size of the very first substep, if steps of first order are made in substeps of adaptive size. Every other step begins
+    /// The largest size of the very first substep, if steps are made in substeps of adaptive size; controlled ones never are. Every other step begins
     /// with substeps like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
-    /// If steps are of first order and the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to
-    /// twelve times.
+    /// If the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to twelve times.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_move: Option<f64>,
     /// How a step is made.

@@ -17,7 +17,7 @@ pub enum Stop {
     /// This many time steps are made.
     #[display("{}", made(*_0))]
     Steps(usize),
-    /// This time is reached; the last step is cut short to end there.
+    /// This time is reached; the last step is cut short to end there, but for mean curvature flow, whose steps have one size.
     #[display("the time {:e} is reached", rounded(*_0))]
     Time(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this.
@@ -38,7 +38,8 @@ pub enum Stop {
     #[display("the energy is stationary")]
     EnergyAtRest,
     /// In space, the Willmore energy is less than half of that of a sphere, which no closed surface has: the phase field does not describe
-    /// a surface any more. Says nothing with spontaneous curvature, tension or pressure.
+    /// a surface any more. Says nothing with spontaneous curvature, tension or pressure, and of shapes that began at the side of the box, through
+    /// which they may go on.
     #[display(
         "the Willmore energy is less than any closed surface has, 8 pi: the time steps were too long for the shape"
     )]
@@ -75,6 +76,15 @@ const LITTLE: f64 = 1e-4;
 const IN_A_ROW: usize = 3;
 
 impl Stop {
+    /// The first time at which one of these rules ends a flow.
+    pub(crate) fn end(stops: &[Self]) -> Option<f64> {
+        let ends = stops.iter().filter_map(|stop| match stop {
+            Self::Time(end) => Some(*end),
+            _ => None,
+        });
+        ends.reduce(f64::min)
+    }
+
     /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
     pub(crate) fn is_rest(&self) -> bool {
         matches!(self, Self::Motion(_) | Self::EnergyAtRest)
@@ -107,7 +117,8 @@ impl Stop {
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
-                D == 3 && flow.is_willmore && energy.is_some_and(|energy| energy < 4.0 * PI)
+                let is_closed = flow.is_willmore && !is_near_side(flow.initial);
+                D == 3 && is_closed && energy.is_some_and(|energy| energy < 4.0 * PI)
             }
             Self::Vanished => !has_interface(&flow.current),
             Self::AtTheSide => is_near_side(&flow.current) && !is_near_side(flow.initial),

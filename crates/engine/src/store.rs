@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use solver::FlowState;
 
 use crate::record::to_csv;
-use crate::{Case, Error, Record, Run};
+use crate::{Case, Error, Record, Run, Stop};
 
 /// The table of all records in a stored run.
 pub const METRICS: &str = "metrics.csv";
@@ -86,7 +86,7 @@ impl Store {
     /// end, which `ends` names, stay and are no longer part of it.
     ///
     /// # Errors
-    /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already.
+    /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already, and for another end time: steps were cut short for the old one.
     pub fn extend<const D: usize>(
         stored: StoredRun,
         case: Case<D>,
@@ -94,6 +94,12 @@ impl Store {
         (checkpoints, notes): (Checkpoints, Value),
         ends: impl Fn(&str) -> bool,
     ) -> Result<(Self, Run<D>), Error> {
+        let stops: Vec<Stop> = read(&stored, &stored.state().notes["case"]["stops"])?;
+        let end = Stop::end(&stops);
+        if end.is_some() && end.map(f64::to_bits) != case.end().map(f64::to_bits) {
+            let reason = "its last step was made for another end time".to_owned();
+            return Err(refused(&stored, reason));
+        }
         let run = restore(&stored, case, device, &["stops"])?;
         if let Some(stop) = run.ended() {
             return Err(refused(&stored, stop.to_string()));
@@ -142,7 +148,7 @@ pub fn notes(stored: &StoredRun) -> &Value {
 }
 
 /// The stop rule that ended a stored run, if it is over.
-pub fn ended(stored: &StoredRun) -> Result<Option<crate::Stop>, Error> {
+pub fn ended(stored: &StoredRun) -> Result<Option<Stop>, Error> {
     read(stored, &stored.state().notes["ended"])
 }
 

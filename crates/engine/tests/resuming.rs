@@ -167,6 +167,59 @@ fn a_driven_run_continues_with_the_same_bytes() {
     assert_eq!(reference.steps(), 3);
 }
 
+#[test]
+fn what_changes_a_result_makes_another_case() {
+    let elements = case(Flow::Willmore, Method::FeImplicit, disc(128, 0.2));
+    let mut direct = elements.clone();
+    direct.operator.linear = fem::LinearSolver::Direct;
+    assert_ne!(elements.identity(&device()), direct.identity(&device()));
+    let mut curved = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    curved.energy.spontaneous_curvature = 5.0;
+    let mut other = curved.clone();
+    other.operator.response = 0.97;
+    assert_ne!(curved.identity(&device()), other.identity(&device()));
+}
+
+/// Its last step was cut short, or shared what was left with the one before.
+#[test]
+fn a_run_to_a_time_is_not_extended_to_another() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("run");
+    let mut to_time = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    to_time.stops = vec![Stop::Time(0.5 * TAU)];
+    let every = Checkpoints::EverySteps(1);
+    let mut run = engine::Run::new(to_time.clone(), &device()).unwrap();
+    let mut store = Store::create(&folder, &[], &run, Value::Null, every).unwrap();
+    let never = Interrupt::never();
+    run.advance(Some(&mut store), &mut [], &never).unwrap();
+    store.finish(&run).unwrap();
+    to_time.stops = vec![Stop::Time(TAU)];
+    let stored = RunDirectory::open(&folder).unwrap();
+    let refused = Store::extend(stored, to_time, &device(), (every, Value::Null), |_| false);
+    let error = refused.err().unwrap().to_string();
+    assert!(error.contains("for another end time"), "{error}");
+}
+
+#[test]
+fn other_files_in_the_folder_of_a_trajectory_stay() {
+    let root = tempfile::tempdir().unwrap();
+    let own = root.path().join("own.txt");
+    std::fs::write(&own, "mine").unwrap();
+    let refused = Trajectory::of(
+        case(Flow::MeanCurvature, Method::Hybrid, disc(128, 0.2)),
+        &device(),
+        root.path(),
+        &Samples::every(1),
+        &mut [],
+        &Interrupt::never(),
+    );
+    assert!(matches!(
+        refused,
+        Err(Error::Runs(runs::Error::Occupied { .. }))
+    ));
+    assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
+}
+
 /// Controlled steps, one of which is refused at first, between marks: the same after an interruption between two of them.
 #[test]
 fn a_controlled_run_continues_with_the_same_bytes() {

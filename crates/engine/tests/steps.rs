@@ -105,6 +105,24 @@ fn controlled(control: ErrorControl) -> Run<2> {
     finished(case)
 }
 
+/// A tension that is too much for a disc draws it together until nothing is left, by and by; of the time error nothing is known then.
+#[test]
+fn a_shape_does_not_vanish_in_one_controlled_step() {
+    let mut case = case(Flow::Willmore, Method::Hybrid, disc(128, 0.15));
+    case.energy.tension = 2000.0;
+    case.steps = TimeSteps::controlled(ErrorControl {
+        first: Some(0.25 * TAU),
+        ..ErrorControl::default()
+    });
+    case.stops = vec![Stop::Vanished, Stop::Steps(40)];
+    let run = finished(case);
+    assert_eq!(run.ended(), Some(Stop::Vanished));
+    let areas = run.records().iter().map(|record| record.measures["volume"]);
+    let last = areas.rev().find(|area| *area > 0.0).unwrap();
+    assert!(last < 0.05 * run.start()["volume"], "{last}");
+    assert_eq!(estimated_time_error(run.records()), None);
+}
+
 /// A square from its corners on: steps grow, none moves the interface too far, the energy falls, and the result is that of ten times stricter
 /// control within the estimated error.
 #[test]

@@ -1,8 +1,10 @@
 //! Every reason to end.
 
 use crate::common::{EPS, TAU, case, device, disc, divided, finished, grid};
-use engine::{Flow, Measure, Method, Record, Run, StepRule, Stop};
-use geometry::Field;
+use engine::{Case, Flow, Measure, Method, Operator, Record, Run, Scales, Scheme, StepRule, Stop};
+use geometry::{Field, Grid, optimal_profile};
+use model::Networks;
+use runs::Interrupt;
 
 #[test]
 fn energies_and_vanishing_end_a_run() {
@@ -35,9 +37,34 @@ fn a_shape_that_comes_to_the_side_ends_a_run_unless_it_was_there_before() {
     let run = finished(growing.clone());
     assert_eq!(run.ended(), Some(Stop::AtTheSide));
     let band = |x: [f64; 2]| x[1].abs() - 0.1;
-    growing.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS)).into();
+    growing.initial = Field::from_fn(grid(128), |x| optimal_profile(band(x), EPS)).into();
     growing.stops = vec![Stop::Steps(1), Stop::AtTheSide];
     assert_eq!(finished(growing).ended(), Some(Stop::Steps(1)));
+}
+
+/// In the periodic box a closed surface that goes through it may have as little energy as a cylinder, `pi / R` for a length of 1.
+#[test]
+fn a_surface_through_the_box_may_have_little_energy() {
+    let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
+    let scales = Scales::of_grid(grid.spacing(), 2.0);
+    let cylinder = |[x, y, _]: [f64; 3]| optimal_profile(x.hypot(y) - 0.3, scales.eps);
+    let needed = scales.needs(3, grid.spacing());
+    let network = Networks::default().find(Scheme::Accurate.shipped(), &needed);
+    let operator = Operator::learned(Scheme::Accurate, network.unwrap()).unwrap();
+    let (initial, steps) = (
+        Field::from_fn(grid, cylinder),
+        (StepRule::Constant(1e-7), 1),
+    );
+    let mut case = Case::willmore("cylinder", initial, operator, scales, steps);
+    case.stops.insert(0, Stop::NoSurface);
+    let mut run = Run::new(case, &device()).unwrap();
+    run.advance(None, &mut [], &Interrupt::never()).unwrap();
+    let energy = run.records()[0].willmore_energy().unwrap();
+    assert!(
+        (energy * 0.3 / std::f64::consts::PI - 1.0).abs() < 0.1,
+        "{energy}"
+    );
+    assert_eq!(run.ended(), Some(Stop::Steps(1)));
 }
 
 /// A disc in a box hardly moves once it is alone with large steps.
@@ -56,7 +83,7 @@ fn stationary_shapes_end_a_run() {
 fn a_flat_interface_is_at_rest() {
     let mut flat = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
     let band = |x: [f64; 2]| x[1].abs() - 0.15;
-    flat.initial = Field::from_fn(grid(128), |x| geometry::optimal_profile(band(x), EPS)).into();
+    flat.initial = Field::from_fn(grid(128), |x| optimal_profile(band(x), EPS)).into();
     let largest = 0.75_f64.powi(4) / 1024.0;
     flat.steps = StepRule::ByEnergy(Some(largest)).into();
     flat.stops = vec![Stop::Steps(12), Stop::EnergyAtRest];
@@ -87,10 +114,13 @@ fn a_measure_that_is_not_finite_stops_a_run() {
     let mut one = case(Flow::MeanCurvature, Method::Hybrid, disc(128, 0.2));
     let ratio = |_: &engine::Current<'_, 2>, t: f64| Ok(Some(if t > 0.0 { f64::NAN } else { 1.0 }));
     one.measures.push(Measure::new("ratio", ratio));
-    let error = Run::new(one, &device()).unwrap().step().unwrap_err();
-    let found = error.to_string();
+    let mut run = Run::new(one, &device()).unwrap();
+    let found = run.step().unwrap_err().to_string();
     assert!(
         found.starts_with("the measure ratio is NaN at t = "),
         "{found}"
     );
+    // The flow has moved, which no record says.
+    let found = run.step().unwrap_err().to_string();
+    assert!(found.ends_with("go on from the last checkpoint"), "{found}");
 }

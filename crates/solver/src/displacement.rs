@@ -3,6 +3,8 @@
 //! Where the profile is `tanh(3 d / (4 eps))`, `atanh u` is the distance `d` in units of `4 eps / 3`, and the difference of two
 //! phase fields in that variable is the displacement of the interface between them.
 
+use geometry::Stored;
+
 /// Values nearer to the pure phases than this are taken for it: behind small radii phase fields overshoot them, and there a
 /// displacement means nothing.
 const PURE: f64 = 1e-3;
@@ -37,6 +39,22 @@ pub(crate) fn window(u: f64) -> f64 {
     const EDGE: f64 = 1e-3;
     let weight = on_interface(u);
     weight / (weight + EDGE)
+}
+
+/// How many interface widths all but a fiftieth of the interface of `u`, which may vanish, is from that of `other`: where `u` changes its sign, the
+/// other phase field says how far its own interface is. At most five, where there is none of it nearby.
+pub fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
+    const VANISHING: f64 = 0.02;
+    let mut depths = other.where_zero(u);
+    for value in &mut depths {
+        *value = depth(*value).abs();
+    }
+    let vanishing = (VANISHING * depths.len() as f64) as usize;
+    if vanishing >= depths.len() {
+        return 0.0;
+    }
+    let (_, depth, _) = depths.select_nth_unstable_by(vanishing, |a, b| b.total_cmp(a));
+    4.0 * *depth / 3.0
 }
 
 /// The factor by which the `L2` metric is too weak for a displacement `d` to a surface of mean curvature `h`, of which `bend` is the product.

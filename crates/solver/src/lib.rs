@@ -61,6 +61,7 @@ mod stored;
 mod times;
 
 pub use constraints::Constraints;
+pub use displacement::widths_between;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
 pub use error::{Error, StepFailure};
 pub use flow::{

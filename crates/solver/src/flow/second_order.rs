@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use super::{Minimum, Movement, StepRecord, WillmoreFlow};
 use crate::constraints::Constraints;
 use crate::displacement::{
-    curvature_weight, depth, displaced, displacement, metric_weight, on_interface, window,
+    curvature_weight, depth, displaced, displacement, metric_weight, on_interface, widths_between,
+    window,
 };
 use crate::stored::tensor;
 use crate::{Error, Start, StartKind};
@@ -155,6 +156,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let unit = 4.0 * self.params.eps / 3.0;
         let between =
             |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
+        // What is gone in the middle of the step, or was not there before, is seen from the other ends.
+        let [gone, new] = [before, after].map(|end| self.params.eps * widths_between(end, middle));
         let error = match &self.rate {
             Some(start) if self.step >= WITHOUT => {
                 let stages = first.zip_map(second, |first, second| {
@@ -170,7 +173,9 @@ impl<const D: usize> WillmoreFlow<D> {
         StepEstimates {
             error,
             motion: between(after, before),
-            displacement: between(middle, before).max(between(after, middle)),
+            displacement: (between(middle, before).max(between(after, middle)))
+                .max(gone)
+                .max(new),
         }
     }
 }
