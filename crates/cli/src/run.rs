@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::time::Instant;
 
 use engine::{Checkpoints, Event, Observer, Storage, Store, estimated_time_error};
+use files::Storage as _;
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
@@ -321,7 +322,11 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
             other.display()
         );
     }
-    Ok(std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder))?)
+    // The folder itself stays: it may be the one that the program works in, a link, or a disk.
+    let empty = || -> std::io::Result<()> {
+        std::fs::read_dir(folder)?.try_for_each(|entry| files::Disk.remove(&entry?.path()))
+    };
+    Ok(empty().map_err(files::Error::of("empty", folder))?)
 }
 
 /// `runs/NAME`, with the first number that is free.

@@ -110,6 +110,8 @@ fn nothing_is_written_over_what_is_there() {
             .contains("cannot start a run in run")
     );
     outcome(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+    // Also in the folder that the program works in, which cannot be removed itself.
+    outcome(&at("run"), &[&flow[..], &[".", "--force"]].concat());
     fs::create_dir(at("own")).unwrap();
     fs::write(at("own/thesis.txt"), "years").unwrap();
     let line = refused(folder.path(), &[&flow[..], &["own", "--force"]].concat());
