@@ -573,13 +573,14 @@ impl MessageOptions {
 
     pub fn warn(self, what: &str) {
         if !self.quiet {
-            eprintln!("warning: {what}");
+            // A closed pipe is no reason to fail here either.
+            let _ = writeln!(std::io::stderr(), "warning: {what}");
         }
     }
 
     pub fn note(self, what: &str) {
         if !self.quiet && !self.json && !self.to_pipe {
-            eprintln!("{what}");
+            let _ = writeln!(std::io::stderr(), "{what}");
         }
     }
 

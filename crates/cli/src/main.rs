@@ -22,6 +22,7 @@ mod values;
 mod volume;
 
 use std::ffi::OsString;
+use std::io::Write;
 use std::process::ExitCode;
 
 use crate::cli::{Cli, Command};
@@ -45,7 +46,8 @@ fn main() -> ExitCode {
             ExitCode::from(Interrupt::EXIT_CODE)
         }
         Err(error) => {
-            eprintln!("error: {}", files::with_causes(&error));
+            // A closed pipe hides the message, and not the failure.
+            let _ = writeln!(std::io::stderr(), "error: {}", files::with_causes(&error));
             ExitCode::from(FAILURE)
         }
     }

@@ -131,6 +131,20 @@ fn nothing_is_written_over_what_is_there() {
     assert!(at("run/final.npy").exists());
 }
 
+/// Nobody may listen to what is told, which changes nothing else.
+#[test]
+fn a_closed_standard_error_is_no_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = ["flow", "builtin:disc", "--cells", "16", "--steps", "1"];
+    for (arguments, code) in [(&flow[..], 0), (&["flow", "missing.obj"], 2)] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = program(folder.path());
+        let output = command.args(arguments).stderr(writer).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}");
+    }
+}
+
 /// A ring of radii 150 and 75 pixels has the energy `pi / 150 + pi / 75`.
 #[test]
 fn energies_lengths_and_areas_of_images_are_those_of_their_pixels() {
