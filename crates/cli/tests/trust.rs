@@ -402,6 +402,32 @@ fn a_finished_run_goes_on_to_more_steps() {
 }
 
 #[test]
+fn a_run_goes_on_without_the_folder_of_its_saved_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let there = folder.path().join("there");
+    fs::create_dir(&there).unwrap();
+    let flow = [
+        "flow",
+        "builtin:disc",
+        "--cells",
+        "16",
+        "--steps",
+        "1",
+        "--output",
+        "run",
+    ];
+    outcome(
+        folder.path(),
+        &[&flow[..], &["--save", "there/disc.png"]].concat(),
+    );
+    fs::remove_dir_all(there).unwrap();
+    let output = run(folder.path(), &["resume", "run", "--steps", "2"]);
+    let told = text(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("its folder is gone"), "{told}");
+}
+
+#[test]
 fn long_steps_are_shortened_and_the_shape_stays() {
     let folder = tempfile::tempdir().unwrap();
     let cube = [

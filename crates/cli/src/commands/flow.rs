@@ -90,6 +90,14 @@ pub fn run(
         options.steps = steps.or(options.steps);
     }
     options.scheme.fill_in()?;
+    // That its folder is gone is no reason not to go on with a run.
+    let is_gone = |save: &mut PathBuf| stored.is_some() && !save.parent().is_some_and(Path::is_dir);
+    if let Some(save) = options.save.take_if(is_gone) {
+        let shown = save.display();
+        messages.warn(&format!(
+            "nothing will be saved to {shown}: its folder is gone"
+        ));
+    }
     if let Some(save) = &mut options.save {
         *save = absolute(&*save)?;
         options.force.check(save)?;
