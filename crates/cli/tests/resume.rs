@@ -148,6 +148,39 @@ fn interrupted_runs_end_with_130_and_are_resumed_to_the_same_bytes() {
     assert_same(&path, &reference);
 }
 
+/// A file that a run has never written is not its own, also where it was to go on to other steps.
+#[test]
+fn a_run_that_was_never_over_writes_over_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, saved] = ["run", "cross.svg"].map(|name| folder.path().join(name));
+    let flow = [
+        "flow",
+        "builtin:cross",
+        "--cells",
+        "32",
+        "--tau",
+        "1e-7",
+        "--steps",
+        "500",
+        "--checkpoint-every",
+        "1",
+        "--save",
+        "cross.svg",
+        "--output",
+        "run",
+    ];
+    for arguments in [&flow[..], &["resume", "run", "--steps", "400"]] {
+        let from = committed(&path).unwrap_or(0);
+        let mut child = start(folder.path(), arguments);
+        assert!(wait_for(&path, from + 1, &mut child));
+        interrupt(&mut child);
+    }
+    std::fs::write(&saved, "mine").unwrap();
+    let refused = run(folder.path(), &["resume", "run"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+    assert_eq!(std::fs::read(saved).unwrap(), b"mine");
+}
+
 /// The stored configuration alone makes the same run.
 #[test]
 fn the_configuration_of_a_run_makes_the_same_run() {

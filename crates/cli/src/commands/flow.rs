@@ -199,6 +199,9 @@ impl Job {
         let (store, run) = match more {
             Some(steps) => {
                 notes["steps"] = steps.into();
+                if stored.is_finished() {
+                    notes["saved"] = true.into();
+                }
                 let with = (checkpoints, notes);
                 Store::extend(stored, case, &self.device, with, presentation::is_of_end)?
             }

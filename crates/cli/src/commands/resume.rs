@@ -18,7 +18,7 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
     };
     let stored_options = command.options();
     // A run that was over has written the file of --save itself.
-    let was_over = stored.is_finished() || !engine::notes(&stored)["steps"].is_null();
+    let was_over = stored.is_finished() || engine::notes(&stored)["saved"] == true;
     stored_options.force.force = options.force.force || was_over;
     if !stored.is_finished() || options.steps.is_some() {
         return flow::run(command, messages, Some((stored, options.steps)));
