@@ -433,7 +433,7 @@ pub struct SampleOptions {
     #[command(flatten)]
     pub input: InputOptions,
 
-    /// The file to write: a picture (.png), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
+    /// The file to write: a picture (.png, of a plane shape .svg), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
     #[arg(long, value_name = "FILE")]
     pub save: PathBuf,
 

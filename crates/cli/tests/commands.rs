@@ -539,11 +539,13 @@ fn samples_are_inputs() {
             outcome(folder.path(), &run);
         }
     }
-    // Files for ParaView are written alone.
-    let written = ["sample", "builtin:ring", "--cells", "32", "--save", "r.vti"];
-    outcome(folder.path(), &written);
-    let file = std::fs::read(folder.path().join("r.vti")).unwrap();
-    assert!(file.starts_with(b"<?xml"));
+    // Files for ParaView and drawings of curves are written alone.
+    for (file, beginning) in [("r.vti", "<?xml"), ("r.svg", "<svg")] {
+        let written = ["sample", "builtin:ring", "--cells", "32", "--save", file];
+        outcome(folder.path(), &written);
+        let content = std::fs::read(folder.path().join(file)).unwrap();
+        assert!(content.starts_with(beginning.as_bytes()), "{file}");
+    }
     // A ball of radius 0.2 whose vertices move by up to 0.01.
     let noisy = |file: &str, seed: &str| {
         let ball = [
@@ -586,6 +588,21 @@ fn samples_are_inputs() {
     let area = geometry::measure::zero_set_volume(&quarter);
     let expected = 0.25 * std::f64::consts::PI * 0.36;
     assert!((area / expected - 1.0).abs() < 0.02, "{area}");
+}
+
+/// The bytes of a name need not be text.
+#[cfg(target_os = "linux")]
+#[test]
+fn samples_have_any_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.png");
+    let mut sample = common::program(folder.path());
+    sample.args(["sample", "builtin:disc", "--cells", "32", "--save"]);
+    let output = sample.arg(name).output().unwrap();
+    let error = common::text(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    assert!(folder.path().join(name).exists());
 }
 
 /// The mask has the pixels of the input, and the region is where its dark pixels are.

@@ -353,7 +353,7 @@ fn every_mistake_is_one_clear_line() {
         (&["sample", "builtin:disc"], "not provided: --save <FILE>"),
         (
             &["sample", "builtin:disc", "--save", "a.jpg"],
-            "must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
+            "must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
         ),
         (
             &["sample", "builtin:disc", "--save", "a.ply"],

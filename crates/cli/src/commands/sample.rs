@@ -26,8 +26,10 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
     let format = extension(&path);
     let is_mesh = MESHES.contains(&&*format);
     let shown = path.display();
-    if !is_mesh && !["png", "npy", "vti", "nii", "gz"].contains(&&*format) {
-        refuse!("--save {shown} must end in .png, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz");
+    if !is_mesh && !["png", "svg", "npy", "vti", "nii", "gz"].contains(&&*format) {
+        refuse!(
+            "--save {shown} must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
+        );
     }
     options.force.check(&path)?;
     let noise = options.noise;
@@ -72,7 +74,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
             Loaded::Space(start) => write(start, options, &path)?,
         }
     }
-    let outcome = json!({ "command": "sample", "file": path });
+    let outcome = json!({ "command": "sample", "file": path.to_string_lossy() });
     messages.report(&outcome, &format!("wrote {shown}"));
     Ok(())
 }
