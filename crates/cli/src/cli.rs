@@ -382,12 +382,12 @@ pub struct FairOptions {
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub keep: Option<String>,
 
-    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved; with --repair of a mesh that is not
-    /// closed
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved, as of a segmentation in any case;
+    /// with --repair of a mesh that is not closed
     #[arg(long)]
     pub remesh: bool,
 
-    /// Go on even if the grid is too coarse for thin parts of the mesh
+    /// Go on even if the grid is too coarse for thin parts of the input
     #[arg(long)]
     pub allow_loss: bool,
 

@@ -192,6 +192,8 @@ impl Source {
 /// Reads an input and fills in the options that were left to it.
 pub struct Reader<'a> {
     pub source: Source,
+    /// Whether thin parts may be lost on the grid.
+    pub allows_loss: bool,
     options: &'a mut InputOptions,
     eps_over_h: f64,
     messages: MessageOptions,
@@ -221,6 +223,7 @@ impl<'a> Reader<'a> {
         }
         Ok(Self {
             source,
+            allows_loss: false,
             options,
             eps_over_h,
             messages,
@@ -361,7 +364,7 @@ impl<'a> Reader<'a> {
         THIN * self.eps_over_h * grid.spacing()
     }
 
-    /// Says that so much of the boundary is thin, if it is much, or refuses to lose even more unless the grid was chosen.
+    /// Says that so much of the boundary is thin, if it is much, or refuses to lose even more unless the grid was chosen or losses are allowed.
     fn tell_thin<const D: usize>(
         &self,
         part: f64,
@@ -378,7 +381,7 @@ impl<'a> Reader<'a> {
             self.thin_below(grid),
             self.cells(),
         );
-        if refuses && part >= MOST_LOST {
+        if refuses && !self.allows_loss && part >= MOST_LOST {
             refuse!("{message}: give a larger --side-length, or --cells to go on all the same");
         }
         self.messages.warn(&message);
@@ -396,7 +399,7 @@ impl<'a> Reader<'a> {
         let grids: Vec<usize> = grids.filter(|&cells| Some(cells) >= coarsest).collect();
         let advice =
             "give a larger --side-length or more --cells, or these --cells to go on without them";
-        let refused = chosen.is_none().then_some(advice);
+        let refused = (chosen.is_none() && !self.allows_loss).then_some(advice);
         let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
         let space = Space {
             up,
@@ -407,11 +410,11 @@ impl<'a> Reader<'a> {
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
-    pub fn own(&mut self, own: OwnMesh, path: &Path, allow_loss: bool) -> Result<Loaded> {
+    pub fn own(&mut self, own: OwnMesh, path: &Path) -> Result<Loaded> {
         let (rough, start) = (own.rough(), &own.fairing().start);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let advice = "use more --cells, or --allow-loss to go on without them";
-        let refused = (!allow_loss).then_some(advice);
+        let refused = (!self.allows_loss).then_some(advice);
         let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refused)?;
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);

@@ -236,6 +236,31 @@ fn every_label_becomes_a_surface() {
     }
 }
 
+/// A plate of 36 x 36 x 5 voxels on a grid whose cells are two of them wide.
+#[test]
+fn thin_labels_are_refused_unless_losses_are_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder.path().join("plate.nii"), |[x, y, z]| {
+        let is_wide = [x, y].iter().all(|v| (1.0..37.0).contains(v));
+        u8::from(is_wide && (16.0..21.0).contains(&z))
+    });
+    let fair = [
+        "fair",
+        "plate.nii",
+        "--box-side",
+        "0.25",
+        "--steps",
+        "1",
+        "--output",
+        "run",
+    ];
+    let refused = run(folder.path(), &fair);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(error.contains("% of the boundary"), "{error}");
+    outcome(folder.path(), &[&fair[..], &["--allow-loss"]].concat());
+}
+
 #[test]
 fn shapes_are_written_as_voxels_and_read_back() {
     let folder = tempfile::tempdir().unwrap();
