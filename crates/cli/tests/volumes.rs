@@ -2,11 +2,15 @@
 
 use std::f64::consts::PI;
 use std::path::Path;
+#[cfg(unix)]
+use std::time::Duration;
 
 use serde_json::Value;
 use surfaces::ClosedMesh;
 use volumes::Volume;
 
+#[cfg(unix)]
+use crate::common::{interrupt, start};
 use crate::common::{outcome, program, run, text};
 
 /// Side of a voxel, and the centre of the first one.
@@ -20,6 +24,14 @@ fn write(path: &Path, label: impl Fn([f64; 3]) -> u8) -> Volume {
     let volume = Volume::of_labels([38; 3], ORIGIN, [SIDE; 3], labels.collect()).unwrap();
     volumes::write(path, &volume).unwrap();
     volume
+}
+
+/// The volume of two balls, labelled 3 and 7, which becomes a file `two.nii` in the folder.
+fn write_two(folder: &Path) -> Volume {
+    write(&folder.join("two.nii"), |x| {
+        let here = |centre, radius| u8::from(ball(x, centre, radius));
+        3 * here([10.0, 18.0, 18.0], 8.0) + 7 * here([28.0, 18.0, 18.0], 6.0)
+    })
 }
 
 /// A ball about this centre, in voxels.
@@ -126,11 +138,7 @@ fn a_noisy_sphere_becomes_a_sphere_at_the_usual_settings() {
 #[test]
 fn every_label_becomes_a_surface() {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("two.nii");
-    let volume = write(&file, |x| {
-        let here = |centre, radius| u8::from(ball(x, centre, radius));
-        3 * here([10.0, 18.0, 18.0], 8.0) + 7 * here([28.0, 18.0, 18.0], 6.0)
-    });
+    let volume = write_two(folder.path());
     for (arguments, parts) in [
         (
             &["flow", "two.nii"][..],
@@ -259,6 +267,25 @@ fn thin_labels_are_refused_unless_losses_are_allowed() {
     assert_eq!(refused.status.code(), Some(2), "{error}");
     assert!(error.contains("% of the boundary"), "{error}");
     outcome(folder.path(), &[&fair[..], &["--allow-loss"]].concat());
+}
+
+/// The signal comes after the steps of the first label, before those of the second one.
+#[cfg(unix)]
+#[test]
+fn an_interruption_between_two_labels_ends_all_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    write_two(folder.path());
+    let [first, second] =
+        [3, 7].map(|label| folder.path().join(format!("run-label{label}/summary.json")));
+    let fair = ["fair", "two.nii", "--label", "all", "--cells", "32"];
+    let options = ["--steps", "2", "--output", "run"];
+    let mut child = start(folder.path(), &[&fair[..], &options].concat());
+    while !first.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "no first label");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    interrupt(&mut child);
+    assert!(!second.exists());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Ctrl-C and `kill` end a run at the next commit, not in the middle.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -20,8 +20,13 @@ impl Interrupt {
     /// SIGINT.
     pub const EXIT_CODE: u8 = 130;
 
-    /// Starts to catch the signals; [`Error::Signals`] if the system does not let it.
+    /// Starts to catch the signals, or gives the flag for which they are caught already: those of a process set one flag. [`Error::Signals`]
+    /// if the system does not let it.
     pub fn catch() -> Result<Self, Error> {
+        static CAUGHT: OnceLock<Interrupt> = OnceLock::new();
+        if let Some(interrupt) = CAUGHT.get() {
+            return Ok(interrupt.clone());
+        }
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {
             // In this order: the first signal finds the flag down and then raises it.
@@ -33,7 +38,7 @@ impl Interrupt {
             .and_then(|_| flag::register(signal, interrupt.0.clone()))
             .map_err(Error::Signals)?;
         }
-        Ok(interrupt)
+        Ok(CAUGHT.get_or_init(|| interrupt).clone())
     }
 
     /// A flag that no signal sets, for callers that have none to wait for.

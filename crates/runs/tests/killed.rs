@@ -165,6 +165,13 @@ fn one_signal_commits_and_two_end_at_once() {
     }
 }
 
+#[test]
+fn the_signals_of_a_process_set_one_flag() {
+    let [first, second] = [(); 2].map(|()| Interrupt::catch().unwrap());
+    first.request();
+    assert!(second.requested());
+}
+
 /// Files cannot exceed a limit: the system's own error in the middle of a write.
 #[test]
 fn where_the_system_refuses_to_write_the_last_commit_stays() {

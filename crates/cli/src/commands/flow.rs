@@ -68,6 +68,10 @@ pub fn run(
 ) -> Result<()> {
     let input = command.options().input.clone();
     let of_label = |label| {
+        // A signal may have come after the last step of the label before.
+        if Interrupt::catch()?.requested() {
+            return Err(Error::Interrupted);
+        }
         let mut one = command.clone();
         let options = one.options();
         options.input.label = Some(Label::One(label));
