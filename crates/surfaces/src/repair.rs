@@ -53,13 +53,15 @@ pub struct Repaired {
 pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     mesh.check(1e70)?;
     let mut old = mesh.merged();
-    let bounds = mesh.bounding_box().filter(|_| !old.faces.is_empty());
-    let bounds = bounds.ok_or(Error::NoFaces)?;
+    if old.faces.is_empty() {
+        return Err(Error::NoFaces);
+    }
+    let turned = orient(&mut old.faces);
+    let triangles: Vec<[Vector; 3]> = old.faces.iter().map(|&f| old.corners(f)).collect();
+    let bounds = bounds(&triangles);
     let side = bounds.longest_side() / PART;
     let corner = bounds.centre().map(|x| x - 0.5 * side);
     let grid = Grid::new(cells, side)?.with_origin(corner)?;
-    let turned = orient(&mut old.faces);
-    let triangles: Vec<[Vector; 3]> = old.faces.iter().map(|&f| old.corners(f)).collect();
     let tree = Windings::new(&triangles);
     let mut winding = sampled(grid, |x| tree.at(x))?;
     if winding.values().iter().sum::<f64>() < 0.0 {

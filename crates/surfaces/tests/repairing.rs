@@ -51,6 +51,16 @@ fn holes_are_closed_and_all_else_stays() {
 }
 
 #[test]
+fn vertices_of_no_face_do_not_make_the_cells_larger() {
+    let mut mesh = sphere();
+    mesh.normals = None;
+    let spacing = |mesh: &TriangleMesh| repair(mesh, 32).unwrap().spacing.to_bits();
+    let expected = spacing(&mesh);
+    mesh.vertices.push([1000.0, 0.0, 0.0]);
+    assert_eq!(spacing(&mesh), expected);
+}
+
+#[test]
 fn faces_of_mixed_orientation_agree() {
     let mut mixed = sphere();
     mixed.normals = None;
