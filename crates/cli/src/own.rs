@@ -122,6 +122,22 @@ impl OwnMesh {
         inputs
     }
 
+    /// Refuses a file whose vertices cannot be moved, unless a new mesh takes their place; `path` is where it was.
+    pub fn check_movable(&self, path: &Path) -> Result<()> {
+        let Loaded { bytes, mesh, .. } = self.loaded();
+        if !self.is_new
+            && let Err(surfaces::Error::Format { problem, .. }) =
+                surfaces::rewrite(bytes, path, mesh)
+        {
+            refuse!(
+                "the vertices of {} cannot be moved: {problem}; write it anew by `willmore sample --save`, which can then be faired, or give \
+                 --remesh",
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
     /// What becomes of the vertices.
     pub fn fairing(&self) -> &Fairing {
         &self.loaded().fairing

@@ -137,6 +137,35 @@ fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_other
     }
 }
 
+/// An octahedron with whole numbers, which are no places to move to.
+#[test]
+fn coordinates_that_cannot_change_are_refused_before_the_flow() {
+    let folder = tempfile::tempdir().unwrap();
+    let octahedron = "ply\nformat ascii 1.0\nelement vertex 6\n\
+         property int x\nproperty int y\nproperty int z\n\
+         element face 8\nproperty list uchar int vertex_indices\nend_header\n\
+         9 0 0\n-9 0 0\n0 9 0\n0 -9 0\n0 0 9\n0 0 -9\n\
+         3 0 2 4\n3 2 1 4\n3 1 3 4\n3 3 0 4\n3 2 0 5\n3 1 2 5\n3 3 1 5\n3 0 3 5\n";
+    fs::write(folder.path().join("whole.ply"), octahedron).unwrap();
+    let fair = ["fair", "whole.ply", "--cells", "32", "--steps", "1"];
+    let refused = run(folder.path(), &fair);
+    let said = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("float or double; write it anew") && said.contains("--remesh"),
+        "{said}"
+    );
+    assert!(!folder.path().join("runs").exists());
+    outcome(
+        folder.path(),
+        &["sample", "whole.ply", "--save", "real.ply"],
+    );
+    outcome(
+        folder.path(),
+        &[&["fair", "real.ply"][..], &fair[2..]].concat(),
+    );
+}
+
 #[test]
 fn meshes_and_pictures_go_through_pipes() {
     let folder = tempfile::tempdir().unwrap();

@@ -104,6 +104,7 @@ impl FairOptions {
         let noise = self.noise.or(self.ends.then_some(0.0));
         let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
+        own.check_movable(path)?;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         let but = if self.remesh {
             ""
