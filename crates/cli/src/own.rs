@@ -122,6 +122,11 @@ impl OwnMesh {
         inputs
     }
 
+    /// The extension of the file.
+    pub fn extension(&self) -> &str {
+        self.file.rsplit('.').next().unwrap_or_default()
+    }
+
     /// Refuses a file whose vertices cannot be moved, unless a new mesh takes their place; `path` is where it was.
     pub fn check_movable(&self, path: &Path) -> Result<()> {
         let Loaded { bytes, mesh, .. } = self.loaded();
@@ -181,7 +186,7 @@ impl OwnMesh {
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
     pub fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64, up: UpAxis) -> Result<Faired> {
-        let (rough, extension) = (self.rough(), extension(Path::new(&self.file)));
+        let (rough, extension) = (self.rough(), self.extension().to_owned());
         if self.is_new {
             let mut mesh = surface(u, eps)?;
             // That of the zero level set, but for what noise does not change.

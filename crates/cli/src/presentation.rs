@@ -1,11 +1,12 @@
 //! What people look at: pictures, meshes, drawings.
 
+use std::ffi::OsStr;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
 
 use crate::faired::Faired;
-use crate::paths::{MESHES, extension};
+use crate::paths::extension;
 use crate::prelude::*;
 
 /// Names of files that hold the shape at the beginning, without their extension.
@@ -78,8 +79,13 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
 
     /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];
-    /// and that of those in the folder of a run.
+    /// and that of those in the folder of a run,
     const USUAL: &'static str;
+
+    /// where what it is at the end may have another one.
+    fn extension(&self) -> &str {
+        Self::USUAL
+    }
 
     /// Refuses other files.
     fn check_saved(path: &Path) -> Result<()> {
@@ -114,21 +120,26 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     fn restore(&mut self, stored: &StoredRun) -> Result<()>;
 }
 
-/// Whether a file is written at the end of a run.
-pub fn is_of_end(name: &str) -> bool {
-    is_stage(name, FINAL) || [SUMMARY, ANIMATION, SERIES].contains(&name)
+/// Whether a file is written at the end of a run, where the shape has this extension.
+pub fn is_of_end(name: &str, shape: &str) -> bool {
+    is_stage(name, FINAL, shape) || [SUMMARY, ANIMATION, SERIES].contains(&name)
 }
 
-/// Whether a file or folder, by its name, is one that a run writes besides those that it begins with.
-pub fn is_written(name: &str) -> bool {
-    let frame = name.starts_with("step-") && is_stage(name, name.split('.').next().unwrap_or(""));
-    is_of_end(name) || is_stage(name, START) || frame || [FRAMES, PAGE].contains(&name)
+/// Whether a file in the folder of a run is one that it writes besides those that it begins with. Its shapes have these extensions, before the
+/// end and there.
+pub fn is_written(path: &Path, [shape, last]: [&str; 2]) -> bool {
+    let name = path.file_name().and_then(OsStr::to_str).unwrap_or_default();
+    let stem = name.split('.').next().unwrap_or_default();
+    if path.parent() == Some(Path::new(FRAMES)) {
+        return stem.starts_with("step-") && is_stage(name, stem, shape);
+    }
+    path == Path::new(name)
+        && (is_of_end(name, last) || name == format!("{START}.{shape}") || name == PAGE)
 }
 
 /// Whether a file shows the shape at a stage of the flow.
-fn is_stage(name: &str, stage: &str) -> bool {
+fn is_stage(name: &str, stage: &str, shape: &str) -> bool {
     let rest = name.strip_prefix(stage).unwrap_or_default();
-    let formats = ["npy", "vti", "png", "svg", "displacement.svg"].into_iter();
-    let mut formats = formats.chain(MESHES);
+    let mut formats = ["npy", "vti", "png", "displacement.svg", shape].into_iter();
     formats.any(|format| rest.strip_prefix('.') == Some(format))
 }

@@ -12,9 +12,12 @@ use solver::StepEstimates;
 use crate::cli::{InputOptions, MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
-use crate::page;
+use crate::paths::extension;
+use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
+use crate::space::Space;
+use crate::{config, page};
 
 /// Everything about a run but its case.
 pub struct Plan<const D: usize, O> {
@@ -44,6 +47,12 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
 
     pub fn checkpoints(&self) -> Checkpoints {
         Checkpoints::EverySteps(self.options.checkpoint_every)
+    }
+
+    /// The extension of the shape at the end.
+    pub fn extension(&self) -> &str {
+        let chosen = self.format.as_deref();
+        chosen.unwrap_or_else(|| self.presentation.extension())
     }
 
     /// From the last checkpoint to the end.
@@ -93,7 +102,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
         // Those of an earlier end of a run that went on.
-        directory.remove_others(presentation::is_of_end)?;
+        directory.remove_others(|name| presentation::is_of_end(name, self.extension()))?;
         Event {
             run,
             directory: Some(directory),
@@ -314,9 +323,7 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
         );
     }
     stored.tidy()?;
-    let name = |path: &Path| path.file_name()?.to_str().map(presentation::is_written);
-    let mut others = stored.leftovers().filter(|path| path.exists());
-    if let Some(other) = others.find(|path| name(path) != Some(true)) {
+    if let Some(other) = foreign(&stored) {
         refuse!(
             "{} is not of the run in this folder, which --force would remove: move it away, or give another --output",
             other.display()
@@ -327,6 +334,37 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
         std::fs::read_dir(folder)?.try_for_each(|entry| files::Disk.remove(&entry?.path()))
     };
     Ok(empty().map_err(files::Error::of("empty", folder))?)
+}
+
+/// What is in the folder of a run, or of its frames, and not of the run.
+fn foreign(stored: &StoredRun) -> Option<PathBuf> {
+    let [shape, last] = extensions(stored);
+    let frames = stored.path().join(presentation::FRAMES);
+    // Where no commit knows a frame, none are listed but their folder.
+    let left = stored.leftovers().flat_map(|path| match path.read_dir() {
+        Ok(entries) if path == frames => entries.flatten().map(|entry| entry.path()).collect(),
+        _ => vec![path.to_owned()],
+    });
+    let is_own = |path: &Path| {
+        let name = path.strip_prefix(stored.path());
+        path.is_file() && name.is_ok_and(|name| presentation::is_written(name, [&shape, &last]))
+    };
+    left.filter(|path| path.exists()).find(|path| !is_own(path))
+}
+
+/// The extensions of the shapes in the folder of a run, before its end and there.
+fn extensions(stored: &StoredRun) -> [String; 2] {
+    let options = stored.read_text(config::FILE).unwrap_or_default();
+    let options: Value = toml::from_str(&options).unwrap_or_default();
+    let is_planar = engine::dimension(stored).is_ok_and(|dimension| dimension == 2);
+    let usual = if is_planar {
+        <Plane as Presentation<2>>::USUAL
+    } else {
+        <Space as Presentation<3>>::USUAL
+    };
+    let own = engine::notes(stored)["presentation"]["own"]["file"].as_str();
+    let last = own.map_or(usual.to_owned(), |file| extension(Path::new(file)));
+    [usual, last.as_str()].map(|usual| options["format"].as_str().unwrap_or(usual).to_owned())
 }
 
 /// `runs/NAME`, with the first number that is free.

@@ -39,6 +39,11 @@ impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
 
+    fn extension(&self) -> &str {
+        let own = self.own.as_ref();
+        own.map_or(Self::USUAL, OwnMesh::extension)
+    }
+
     fn of_box(_: &Grid<3>) -> Result<Self> {
         Ok(Self::default())
     }

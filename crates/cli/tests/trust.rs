@@ -117,14 +117,25 @@ fn nothing_is_written_over_what_is_there() {
     let line = refused(folder.path(), &[&flow[..], &["own", "--force"]].concat());
     assert!(line.contains("holds thesis.txt"), "{line}");
     assert!(at("own/thesis.txt").exists());
-    // Nor what somebody has put beside a run.
-    fs::write(at("run/thesis.txt"), "years").unwrap();
-    let line = refused(folder.path(), &[&flow[..], &["run", "--force"]].concat());
-    assert!(line.contains("thesis.txt is not of the run"), "{line}");
-    outcome(folder.path(), &["resume", "run", "--steps", "2"]);
-    assert_eq!(fs::read(at("run/thesis.txt")).unwrap(), b"years");
+    // Nor what somebody has put beside a run, also under a name that other runs have.
+    fs::create_dir(at("run/frames")).unwrap();
+    for (name, steps) in [
+        ("thesis.txt", "2"),
+        ("final.stl", "3"),
+        ("frames/a.png", "4"),
+    ] {
+        let file = at("run").join(name);
+        fs::write(&file, "years").unwrap();
+        let line = refused(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+        assert!(
+            line.contains(&format!("{name} is not of the run")),
+            "{line}"
+        );
+        outcome(folder.path(), &["resume", "run", "--steps", steps]);
+        assert_eq!(fs::read(&file).unwrap(), b"years");
+        fs::remove_file(file).unwrap();
+    }
     // Nor a folder with the input.
-    fs::remove_file(at("run/thesis.txt")).unwrap();
     let again = ["flow", "run/final.npy", "--output", "run", "--force"];
     let line = refused(folder.path(), &again);
     assert!(line.contains("is in the folder of --output"), "{line}");

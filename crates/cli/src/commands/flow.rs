@@ -207,7 +207,8 @@ impl Job {
                     notes["saved"] = true.into();
                 }
                 let with = (checkpoints, notes);
-                Store::extend(stored, case, &self.device, with, presentation::is_of_end)?
+                let ends = |name: &str| presentation::is_of_end(name, plan.extension());
+                Store::extend(stored, case, &self.device, with, ends)?
             }
             None => Store::resume(stored, case, &self.device, checkpoints)?,
         };
