@@ -155,7 +155,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             "steps": run.steps(),
             "time": run.time(),
             "time_steps": time_accuracy(run.records(), eps),
-            "shortened_steps": run.records().iter().filter(|record| record.halvings > 0).count(),
+            "shortened_steps": run.records().iter().filter(|record| is_shortened(record)).count(),
             "first_energy": first_energy,
             "energy": energy,
             "energy_terms": energy.filter(|_| !is_willmore).map(|_| case.energy),
@@ -374,6 +374,12 @@ pub fn free_folder(name: &str) -> PathBuf {
     let mut folders = names.map(|name| Path::new("runs").join(name));
     let free = folders.find(|folder| !folder.exists());
     free.expect("some number is free")
+}
+
+/// Whether a step is shorter than its rule says; no rule says it of controlled steps, which are made again until their error is small enough.
+fn is_shortened(record: &Record) -> bool {
+    let controlled = record.minimization.and_then(|made| made.estimates);
+    record.halvings > 0 && controlled.is_none()
 }
 
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,

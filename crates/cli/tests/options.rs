@@ -63,6 +63,18 @@ fn tolerances_are_lengths_in_the_units_of_the_input() {
     assert!((ratio / 128.0 - 1.0).abs() < 1e-9, "{other}");
 }
 
+/// From a corner controlled steps are made again until their error is what it may be, which is nothing to tell.
+#[test]
+fn controlled_steps_are_not_said_to_be_shortened() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = ["flow", "builtin:cross", "--cells", "32", "--steps", "5"];
+    let options = ["--tolerance", "0.001%", "--output", "run"];
+    let ended = outcome(folder.path(), &[&flow[..], &options].concat());
+    let halvings = column(&folder.path().join("run"), "halvings");
+    assert!(halvings.iter().any(|times| *times > 0.0), "{halvings:?}");
+    assert_eq!(ended["shortened_steps"], 0, "{ended}");
+}
+
 /// Bricks hold a part of the grid, and the flow on them is that on all of it.
 #[test]
 fn what_is_stored_changes_the_cost_and_not_the_flow() {
