@@ -86,20 +86,21 @@ impl Original {
     fn with(&self, drawing: &Picture) -> Result<Picture> {
         let [ink, paper] = [(u8::MAX, 0.0), (0, 255.0)].map(|(opacity, usual)| {
             let around = self.tone(drawing, opacity);
-            around.unwrap_or([usual, usual, usual, 255.0])
+            around.unwrap_or_else(|| weighted([usual, usual, usual, 255.0]))
         });
         let mixed = |(k, own): (usize, &[u8; 4])| {
             if !self.drawn[k] {
                 return *own;
             }
             let part = f64::from(drawing.pixels()[k][3]) / 255.0;
-            std::array::from_fn(|c| (part * ink[c] + (1.0 - part) * paper[c]).round() as u8)
+            let [r, g, b, opacity] = [0, 1, 2, 3].map(|c| part * ink[c] + (1.0 - part) * paper[c]);
+            [r / opacity, g / opacity, b / opacity, opacity].map(|value| value.round() as u8)
         };
         let pixels = self.picture.pixels().iter().enumerate().map(mixed);
         Ok(Picture::new(self.picture.size(), pixels.collect())?)
     }
 
-    /// The mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
+    /// The [weighted] mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
     fn tone(&self, drawing: &Picture, opacity: u8) -> Option<[f64; 4]> {
         let width = self.picture.size()[0] as usize;
         let place = |pixel: usize| [pixel % width, pixel / width].map(|i| i as f64);
@@ -113,13 +114,20 @@ impl Original {
                 let fits = drawing.pixels()[pixel][3] == opacity && !self.drawn[pixel];
                 if fits && (!near || around.contains(place(pixel))) {
                     count += 1.0;
-                    sum = std::array::from_fn(|c| sum[c] + f64::from(own[c]));
+                    let own = weighted(own.map(f64::from));
+                    sum = std::array::from_fn(|c| sum[c] + own[c]);
                 }
             }
             (count > 0.0).then(|| sum.map(|sum| sum / count))
         };
         mean(true).or_else(|| mean(false))
     }
+}
+
+/// The channels of a colour times its opacity, and its opacity, as colours are mixed. What is transparent has next to none.
+fn weighted([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
+    let opacity = opacity.max(1e-6);
+    [opacity * r, opacity * g, opacity * b, opacity]
 }
 
 impl Presentation<2> for Plane {

@@ -288,6 +288,28 @@ fn inpainting_copies_the_pixels_outside_of_the_mask_in_their_colours() {
     assert_eq!(repaired.pixel(140, 80), paper);
 }
 
+/// A red disc on transparent ground: at its edge it is less opaque, and not darker.
+#[test]
+fn inpainting_keeps_the_colours_of_what_is_half_transparent() {
+    let folder = tempfile::tempdir().unwrap();
+    let pixel = |k: usize| {
+        let [x, y] = [k % 64, k / 64].map(|i| i as f64 - 31.5);
+        let inside = x.hypot(y) < 20.0;
+        if inside { [255, 0, 0, 255] } else { [0; 4] }
+    };
+    let picture = Picture::new([64; 2], (0..64 * 64).map(pixel).collect()).unwrap();
+    picture.write_png(folder.path().join("disc.png")).unwrap();
+    let inpaint = ["inpaint", "disc.png", "--mask", "ball:52,32,10"];
+    let options = ["--cells", "32", "--steps", "1", "--output", "run"];
+    outcome(folder.path(), &[&inpaint[..], &options].concat());
+    let path = folder.path().join("run/final.png");
+    let repaired = images::colours(&path, &fs::read(&path).unwrap()).unwrap();
+    let opaque = repaired.pixels().iter().filter(|pixel| pixel[3] > 0);
+    let opaque: Vec<_> = opaque.collect();
+    assert!(opaque.iter().any(|pixel| pixel[3] < 255));
+    assert!(opaque.iter().all(|pixel| pixel[..3] == [255, 0, 0]));
+}
+
 #[test]
 fn photographs_are_refused_until_it_is_said_what_is_inside() {
     let folder = tempfile::tempdir().unwrap();
