@@ -19,7 +19,6 @@ pub mod comparison;
 pub mod equilibria;
 pub mod harness;
 pub mod inpainting;
-pub mod libraries;
 pub mod mesh_flow;
 pub mod meshes;
 pub mod networks;

@@ -2,7 +2,7 @@
 
 use model::{NamedNetwork, NeededNetwork, Networks, Ratios};
 
-use crate::libraries::*;
+use crate::prelude::libraries::*;
 
 /// Interface width `eps = 2^-6`.
 pub const EPS: f64 = 1.0 / 64.0;

@@ -1,7 +1,7 @@
 //! Options common to all programs.
 
-use crate::libraries::*;
 use crate::networks::NetworkOptions;
+use crate::prelude::libraries::*;
 
 /// Options of every program.
 #[derive(Args, Clone, Debug)]

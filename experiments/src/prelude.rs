@@ -1,6 +1,8 @@
 //! What nearly every program needs.
 
-pub use crate::libraries::*;
+pub mod libraries;
+
+pub use self::libraries::*;
 pub use crate::networks::{
     ACCURATE, Chosen, ELEMENTS, EPS, NetworkOptions, PAPERS, STEP, convergence_network, operator,
     planar_flow, takes_networks, time,

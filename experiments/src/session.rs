@@ -5,8 +5,8 @@ use std::io::Write;
 use report::{Manifest, Summary};
 use runs::Interrupt;
 
-use crate::libraries::*;
 use crate::options::RunOptions;
+use crate::prelude::libraries::*;
 
 /// A program whose options are checked, and what it has to say so far.
 pub struct Session {

@@ -2,7 +2,7 @@
 
 use engine::Values;
 
-use crate::libraries::*;
+use crate::prelude::libraries::*;
 use crate::session::Session;
 
 /// A step of one of several runs, or its beginning, which has no record.

@@ -2,9 +2,9 @@
 
 use geometry::contour::zero_level;
 
-use crate::libraries::*;
 use crate::networks::{Chosen, NetworkOptions, convergence_network, takes_networks};
 use crate::options::{RunOptions, distinct};
+use crate::prelude::libraries::*;
 
 /// Options of the studies.
 #[derive(Args, Clone, Debug)]
