@@ -324,7 +324,9 @@ impl Comparison<'_> {
             let chart = LineChart::new(title, Axis::linear("time t"), Axis::log(y));
             self.study.chart(chart, curves)
         };
-        let papers = chart("to the reference", "L² distance", |run| &run.errors);
+        // The reference may be all that is compared.
+        let papers = self.runs.iter().any(|run| !run.errors.is_empty());
+        let papers = papers.then(|| chart("to the reference", "L² distance", |run| &run.errors));
         let largest = "largest distance of the curves";
         let mut exact = chart("to the exact flow", largest, |run| &run.from_exact);
         let (mut entries, styles) = (Vec::new(), [LineStyle::Solid, LineStyle::Dotted]);
@@ -335,8 +337,13 @@ impl Comparison<'_> {
             entries.push(LegendEntry::line(label, Colour::Grey, style));
         }
         let reference = self.about_the_reference();
-        Figure::new(format!("{}: distances over time", self.setting.title), 2)
-            .with_panels([papers, exact.with_entries(entries)])
+        let panels: Vec<_> = papers
+            .into_iter()
+            .chain([exact.with_entries(entries)])
+            .collect();
+        let title = format!("{}: distances over time", self.setting.title);
+        Figure::new(title, panels.len())
+            .with_panels(panels)
             .with_shared_legend()
             .with_note(format!("ε = 2⁻⁶, time step 2⁻¹⁴. {reference}"))
     }

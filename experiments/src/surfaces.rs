@@ -187,6 +187,15 @@ pub fn energy_by_elements(
     Ok(Some(case.implicit_elements()?.willmore_energy(&u()?)?))
 }
 
+/// How that is measured on a grid, or what is shown in its place.
+pub fn measured(grid: &Grid<3>) -> &'static str {
+    if grid.len() > MOST_NODES {
+        "as the scheme measures it"
+    } else {
+        "with the implicit finite-element step"
+    }
+}
+
 impl Flowed {
     /// Measures the phase field after a step, and writes its isosurface.
     fn snapshot(&self, step: usize, stage: &Stage<'_>) -> Result<Snapshot> {
@@ -332,11 +341,6 @@ impl Setting {
             pictures.collect::<Result<Vec<_>, _>>()
         })?;
         let columns = pictures.iter().map(Vec::len).max();
-        let measured = if self.grid.len() > MOST_NODES {
-            "as the scheme measures it"
-        } else {
-            "with the implicit finite-element step"
-        };
         let label = |one: &Flowed| {
             let operator = one.label().replace(", ", "\n");
             format!("{}\n{operator}", one.surface.title)
@@ -345,8 +349,8 @@ impl Setting {
             .with_row_labels(all.iter().map(label))
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
-                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy {measured}; a sphere has 8π = 25.13.{remarks}",
-                self.n, in_words(time.0.rule)
+                "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy {}; a sphere has 8π = 25.13.{remarks}",
+                self.n, in_words(time.0.rule), measured(&self.grid)
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));

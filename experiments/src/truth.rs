@@ -70,7 +70,7 @@ pub const DISK: Sample<3> = Sample {
 pub const ELLIPSOID: Sample<3> = Sample {
     key: "ellipsoid",
     title: "Ellipsoid",
-    side: 1.0,
+    side: 1.5,
     initial: |grid, eps| {
         let profile = Ellipse::new([0.3, 0.2])?;
         let distance = |[x, y, z]: [f64; 3]| profile.signed_distance([x.hypot(y), z]);
@@ -291,14 +291,16 @@ fn level(field: &Field<2>, _: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
     Ok(curves.flat_map(|curve| curve.points).collect())
 }
 
-/// Distance from the axis and height of the vertices of the isosurface, from the upper pole to the lower one as seen from the origin. The
-/// grid and the surface are symmetric, so that an eighth of the vertices is enough.
+/// Distance from the axis and height of the vertices of the isosurface, around the origin: from the upper pole to the lower one, and back on the
+/// other side of the axis. The grid and the surface are symmetric, so that an eighth of the vertices is enough.
 fn profile(field: &Field<3>, eps: f64) -> Result<Vec<[f64; 2]>, surfaces::Error> {
     let vertices = phase_field_surface(field, eps)?.vertices.into_iter();
     let eighth = vertices.filter(|[x, y, _]| (0.0..=*x).contains(y));
     let mut points: Vec<[f64; 2]> = eighth.map(|[x, y, z]| [x.hypot(y), z]).collect();
     let angle = |[r, z]: &[f64; 2]| r.atan2(*z);
     points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+    let mirrored: Vec<_> = points.iter().rev().map(|[r, z]| [-r, *z]).collect();
+    points.extend(mirrored);
     Ok(points)
 }
 
@@ -444,6 +446,21 @@ mod tests {
         ] {
             let [x, y] = nearest(&square, p);
             assert!((x - expected[0]).hypot(y - expected[1]) < 1e-15, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn extrapolated_profiles_are_so_at_the_poles() {
+        let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
+        let reached = |radius: f64| {
+            let ball = phase_field(grid, &Ball::new([0.0; 3], radius).unwrap(), 1.0 / 16.0);
+            profile(&ball.unwrap(), 1.0 / 16.0).unwrap()
+        };
+        let (double, single) = (reached(0.28), reached(0.27));
+        for p in single.iter().filter(|[r, _]| r.abs() < 0.1) {
+            let [x, y] = nearest(&double, *p);
+            let gone = (p[0] - x).hypot(p[1] - y);
+            assert!((gone - 0.01).abs() < 1e-3, "{p:?} {gone}");
         }
     }
 

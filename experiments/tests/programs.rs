@@ -580,8 +580,8 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     let mut flow = Run::new(case, &ComputeDevice::default_compiled().unwrap()).unwrap();
     while flow.step().unwrap().is_some() {}
     let hvp = flow.records().iter().filter_map(Record::hvp).sum::<f64>() / 2.0;
-    assert!((metric("cross.n128.hvp_per_step") - hvp).abs() < 1e-12);
-    let distance = metric("cross.n128.distance_to_tighter");
+    assert!((metric("disc.n128.hvp_per_step") - hvp).abs() < 1e-12);
+    let distance = metric("disc.n128.distance_to_tighter");
     assert!(distance > 0.0 && distance < 0.02, "{distance}");
     let all = fs::read_to_string(root.path().join("out/performance.json")).unwrap();
     let all: Vec<serde_json::Value> = serde_json::from_str(&all).unwrap();

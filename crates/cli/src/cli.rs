@@ -382,8 +382,8 @@ pub struct FairOptions {
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub keep: Option<String>,
 
-    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved, as of a segmentation in any case;
-    /// with --repair of a mesh that is not closed
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved. A segmentation always gives a new mesh;
+    /// with --repair it may be that of a mesh that is not closed
     #[arg(long)]
     pub remesh: bool,
 

@@ -192,8 +192,8 @@ impl Source {
 /// Reads an input and fills in the options that were left to it.
 pub struct Reader<'a> {
     pub source: Source,
-    /// Whether thin parts may be lost on the grid.
-    pub allows_loss: bool,
+    /// Whether thin parts may be lost on the grid, if there is an option that says so.
+    pub allows_loss: Option<bool>,
     options: &'a mut InputOptions,
     eps_over_h: f64,
     messages: MessageOptions,
@@ -223,7 +223,7 @@ impl<'a> Reader<'a> {
         }
         Ok(Self {
             source,
-            allows_loss: false,
+            allows_loss: None,
             options,
             eps_over_h,
             messages,
@@ -381,8 +381,9 @@ impl<'a> Reader<'a> {
             self.thin_below(grid),
             self.cells(),
         );
-        if refuses && !self.allows_loss && part >= MOST_LOST {
-            refuse!("{message}: give a larger --side-length, or --cells to go on all the same");
+        if refuses && self.allows_loss != Some(true) && part >= MOST_LOST {
+            let or = self.allows_loss.map_or("", |_| " or --allow-loss");
+            refuse!("{message}: give a larger --side-length, or --cells{or} to go on all the same");
         }
         self.messages.warn(&message);
         Ok(())
@@ -399,7 +400,7 @@ impl<'a> Reader<'a> {
         let grids: Vec<usize> = grids.filter(|&cells| Some(cells) >= coarsest).collect();
         let advice =
             "give a larger --side-length or more --cells, or these --cells to go on without them";
-        let refused = (chosen.is_none() && !self.allows_loss).then_some(advice);
+        let refused = (chosen.is_none() && self.allows_loss != Some(true)).then_some(advice);
         let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
         let space = Space {
             up,
@@ -414,7 +415,7 @@ impl<'a> Reader<'a> {
         let (rough, start) = (own.rough(), &own.fairing().start);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let advice = "use more --cells, or --allow-loss to go on without them";
-        let refused = (!self.allows_loss).then_some(advice);
+        let refused = (self.allows_loss != Some(true)).then_some(advice);
         let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refused)?;
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);

@@ -127,20 +127,21 @@ impl OwnMesh {
         self.file.rsplit('.').next().unwrap_or_default()
     }
 
-    /// Refuses a file whose vertices cannot be moved, unless a new mesh takes their place; `path` is where it was.
+    /// Refuses a file whose vertices cannot be moved, by a rewrite that moves none, unless a new mesh takes their place; `path` is where it was.
     pub fn check_movable(&self, path: &Path) -> Result<()> {
         let Loaded { bytes, mesh, .. } = self.loaded();
-        if !self.is_new
-            && let Err(surfaces::Error::Format { problem, .. }) =
-                surfaces::rewrite(bytes, path, mesh)
-        {
-            refuse!(
+        if self.is_new {
+            return Ok(());
+        }
+        match surfaces::rewrite(bytes, path, mesh) {
+            Err(surfaces::Error::Format { problem, .. }) => refuse!(
                 "the vertices of {} cannot be moved: {problem}; write it anew by `willmore sample --save`, which can then be faired, or give \
                  --remesh",
                 path.display()
-            );
+            ),
+            Err(other) => Err(Error::mesh(other)),
+            Ok(_) => Ok(()),
         }
-        Ok(())
     }
 
     /// What becomes of the vertices.

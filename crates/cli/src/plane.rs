@@ -124,7 +124,8 @@ impl Original {
     }
 }
 
-/// The channels of a colour times its opacity, and its opacity, as colours are mixed. What is transparent has next to none.
+/// The channels of a colour times its opacity, and its opacity: in this form colours are averaged. What is transparent weighs next to nothing, so
+/// that its colour counts only where there is no other.
 fn weighted([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
     let opacity = opacity.max(1e-6);
     [opacity * r, opacity * g, opacity * b, opacity]

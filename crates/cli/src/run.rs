@@ -12,12 +12,9 @@ use solver::StepEstimates;
 use crate::cli::{InputOptions, MessageOptions, RunOptions};
 use crate::faired::Faired;
 use crate::outcome::{self, SIZES};
-use crate::paths::extension;
-use crate::plane::Plane;
+use crate::page;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
-use crate::space::Space;
-use crate::{config, page};
 
 /// Everything about a run but its case.
 pub struct Plan<const D: usize, O> {
@@ -42,6 +39,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
             "presentation": self.presentation,
+            "extensions": [self.format.as_deref().unwrap_or(O::USUAL), self.extension()],
         })
     }
 
@@ -154,7 +152,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             "finished": true,
             "steps": run.steps(),
             "time": run.time(),
-            "time_steps": time_accuracy(run.records(), eps),
+            "time_steps": time_accuracy(run.records(), eps).filter(|_| has_interface(u)),
             "shortened_steps": run.records().iter().filter(|record| is_shortened(record)).count(),
             "first_energy": first_energy,
             "energy": energy,
@@ -338,7 +336,8 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
 
 /// What is in the folder of a run, or of its frames, and not of the run.
 fn foreign(stored: &StoredRun) -> Option<PathBuf> {
-    let [shape, last] = extensions(stored);
+    let extensions: [String; 2] =
+        Deserialize::deserialize(&engine::notes(stored)["extensions"]).unwrap_or_default();
     let frames = stored.path().join(presentation::FRAMES);
     // Where no commit knows a frame, none are listed but their folder.
     let left = stored.leftovers().flat_map(|path| match path.read_dir() {
@@ -347,24 +346,12 @@ fn foreign(stored: &StoredRun) -> Option<PathBuf> {
     });
     let is_own = |path: &Path| {
         let name = path.strip_prefix(stored.path());
-        path.is_file() && name.is_ok_and(|name| presentation::is_written(name, [&shape, &last]))
+        path.is_file()
+            && name.is_ok_and(|name| {
+                presentation::is_written(name, extensions.each_ref().map(String::as_str))
+            })
     };
     left.filter(|path| path.exists()).find(|path| !is_own(path))
-}
-
-/// The extensions of the shapes in the folder of a run, before its end and there.
-fn extensions(stored: &StoredRun) -> [String; 2] {
-    let options = stored.read_text(config::FILE).unwrap_or_default();
-    let options: Value = toml::from_str(&options).unwrap_or_default();
-    let is_planar = engine::dimension(stored).is_ok_and(|dimension| dimension == 2);
-    let usual = if is_planar {
-        <Plane as Presentation<2>>::USUAL
-    } else {
-        <Space as Presentation<3>>::USUAL
-    };
-    let own = engine::notes(stored)["presentation"]["own"]["file"].as_str();
-    let last = own.map_or(usual.to_owned(), |file| extension(Path::new(file)));
-    [usual, last.as_str()].map(|usual| options["format"].as_str().unwrap_or(usual).to_owned())
 }
 
 /// `runs/NAME`, with the first number that is free.
@@ -376,7 +363,7 @@ pub fn free_folder(name: &str) -> PathBuf {
     free.expect("some number is free")
 }
 
-/// Whether a step is shorter than its rule says; no rule says it of controlled steps, which are made again until their error is small enough.
+/// Whether a step was made shorter than its rule wanted it. Controlled steps have no such size: they are made again until they are accurate enough.
 fn is_shortened(record: &Record) -> bool {
     let controlled = record.minimization.and_then(|made| made.estimates);
     record.halvings > 0 && controlled.is_none()

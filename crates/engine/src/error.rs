@@ -12,10 +12,10 @@ pub enum Error {
     )]
     ReducedVolume { target: f64, present: f64 },
     #[error(
-        "no other shape of this volume has so small a surface (reduced volume {reduced_volume:.5}), so that nothing could move: hold one of the \
-         two sizes, or a smaller reduced volume"
+        "no shape in the box with the volume {volume:.5e} has less surface than {perimeter:.5e}, so that nothing could move (in the plane, length and \
+         area): hold one of the two sizes, or more surface for this volume"
     )]
-    Roundest { reduced_volume: f64 },
+    LeastPerimeter { perimeter: f64, volume: f64 },
     #[error(
         "{case}: the step before failed after the flow had moved: go on from the last checkpoint"
     )]

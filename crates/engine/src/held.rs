@@ -7,7 +7,8 @@ use solver::Constraints;
 
 use crate::Error;
 
-/// The reduced volume of balls, as they are measured, is 1 up to this; for shapes through the box it is taken with respect to theirs.
+/// Up to this the measured sizes of a ball are those of one: its reduced volume is nearly 1. Of a shape through the box it is likewise the power
+/// of the least perimeter over its own.
 const ROUND: f64 = 1e-4;
 
 /// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
@@ -110,8 +111,7 @@ impl Held {
         if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {
             let part = least_perimeter(grid, volume) / perimeter;
             if part.powf(D as f64 / (D as f64 - 1.0)) > 1.0 - ROUND {
-                let reduced_volume = reduced_volume(D, perimeter, volume);
-                return Err(Error::Roundest { reduced_volume });
+                return Err(Error::LeastPerimeter { perimeter, volume });
             }
         }
         Ok(())
@@ -201,7 +201,7 @@ mod tests {
             check_kept(&ball, 64),
         ] {
             let error = refused.unwrap_err();
-            assert!(matches!(error, Error::Roundest { .. }), "{error}");
+            assert!(matches!(error, Error::LeastPerimeter { .. }), "{error}");
         }
         check_kept(&Ellipse::new([0.3, 0.28]).unwrap(), 64).unwrap();
         // Of a band through the box both can be held where it is wavy; a straight one has the least length.

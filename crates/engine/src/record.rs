@@ -83,7 +83,7 @@ pub fn energy_increases(records: &[Record]) -> usize {
 pub(crate) const ESTIMATES_MISS: f64 = 1.35;
 
 /// The estimated time error of second-order steps at the end of the last of them, largest over the interface; none before the first
-/// [estimate](solver::StepEstimates), and where nothing is left that moves.
+/// [estimate](solver::StepEstimates).
 ///
 /// The flow does not depend on time: what a step is late lasts. So the local error `e_k` of a step in which the interface moves at the rate
 /// `F_k` is taken for a delay, and all of them count at the present rate, `1.35 F_n sum_k e_k / F_k`. Their plain sum would not see that shapes forget
@@ -97,7 +97,7 @@ pub fn estimated_time_error(records: &[Record]) -> Option<f64> {
             delay = Some(delay.unwrap_or(0.0) + error / rate);
         }
     }
-    (rate > 0.0).then_some(ESTIMATES_MISS * delay? * rate)
+    Some(ESTIMATES_MISS * delay? * rate)
 }
 
 /// All Hessian-vector products.

@@ -105,8 +105,8 @@ impl<const D: usize> Run<D> {
     /// Makes one step: a minimization of the next size, halved if it fails and the rule allows that. None once a stop rule holds.
     ///
     /// # Errors
-    /// [`Error::Step`], [`Error::TooStiff`]; errors of measures, and where the result is not finite, after which the run goes on from its last
-    /// checkpoint only, as [`Error::Torn`] says.
+    /// [`Error::Step`], [`Error::TooStiff`]: the run stays where it was. After errors of measures, or if what a step has made is not finite, it
+    /// goes on from its last checkpoint only, and further steps are [`Error::Torn`].
     pub fn step(&mut self) -> Result<Option<&Record>, Error> {
         if self.ended.is_some() {
             return Ok(None);
@@ -152,9 +152,9 @@ impl<const D: usize> Run<D> {
     /// A step that succeeds and is short enough.
     fn attempt(&mut self) -> Result<Attempt, Error> {
         let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
-        let shorter_by = self.control.shorter_by();
+        let halvings_of_motion = self.control.halvings_of_motion();
         if !self.case.held.is_empty() {
-            most = most.max(shorter_by);
+            most = most.max(halvings_of_motion);
         }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let longest = self.case.steps.longest_move;
@@ -165,7 +165,9 @@ impl<const D: usize> Run<D> {
             .last()
             .filter(|last| longest.is_some() && last.halvings > 0);
         let longer = |last: &Record| if last.far { 1.5 } else { 2.0 };
-        while last.is_some_and(|last| size > longer(last) * last.tau) && halvings < shorter_by {
+        while last.is_some_and(|last| size > longer(last) * last.tau)
+            && halvings < halvings_of_motion
+        {
             size *= 0.5;
             halvings += 1;
         }
@@ -186,7 +188,7 @@ impl<const D: usize> Run<D> {
                         (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
                         _ => 0.0,
                     };
-                    let too_far = part > 1.0 && halvings < shorter_by;
+                    let too_far = part > 1.0 && halvings < halvings_of_motion;
                     let Some((state, _)) = before.as_ref().filter(|_| too_far) else {
                         return Ok(Attempt {
                             halvings,
@@ -353,6 +355,7 @@ struct Attempt {
 
 /// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
 const FAR: f64 = 0.6;
+
 /// The measures of a phase field at a time.
 fn values<const D: usize>(
     measures: &[Measure<D>],

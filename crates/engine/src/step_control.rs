@@ -13,7 +13,7 @@ const MUCH: f64 = 0.3;
 /// How often a step by the energy is halved before the run gives up.
 const HALVINGS: u32 = 24;
 /// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
-const SHORTER: u32 = 12;
+const HALVINGS_OF_MOTION: u32 = 12;
 
 /// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
 /// [accepting](Self::accept) them again restores it.
@@ -116,10 +116,11 @@ impl StepControl {
         }
     }
 
-    /// How often it may be halved where the interface moves too far, or what is held cannot be: substeps no further than where they end.
-    pub(crate) fn shorter_by(&self) -> u32 {
+    /// How often a step may be halved that moves the interface too far, or cannot hold what it is to hold. Substeps have a smallest size, of which
+    /// places in the step are multiples.
+    pub(crate) fn halvings_of_motion(&self) -> u32 {
         self.substeps
-            .map_or(SHORTER, |substeps| substeps.halvings())
+            .map_or(HALVINGS_OF_MOTION, |substeps| substeps.halvings())
     }
 
     pub(crate) fn step(&self) -> usize {

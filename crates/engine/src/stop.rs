@@ -117,8 +117,8 @@ impl Stop {
             }
             Self::NoSurface => {
                 let energy = last.and_then(Record::willmore_energy);
-                let is_closed = flow.is_willmore && !is_near_side(flow.initial);
-                D == 3 && is_closed && energy.is_some_and(|energy| energy < 4.0 * PI)
+                let is_low = energy.is_some_and(|energy| energy < 4.0 * PI);
+                D == 3 && flow.is_willmore && is_low && !is_near_side(flow.initial)
             }
             Self::Vanished => !has_interface(&flow.current),
             Self::AtTheSide => is_near_side(&flow.current) && !is_near_side(flow.initial),

@@ -10,8 +10,8 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use render::Picture;
 
-use crate::error::{LARGEST_FILE, LARGEST_IMAGE};
 use crate::image::pixels;
+use crate::limits::{LARGEST_FILE, LARGEST_IMAGE};
 use crate::{Error, FormatError, Image};
 
 /// Most bytes for each pixel while decoding.

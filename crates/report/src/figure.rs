@@ -312,12 +312,16 @@ impl<'a> Cell<'a> {
         let (plot, outer, middle) = (self.plot, self.outer, self.plot.centre().x);
         let (title, remark, style) = self.texts();
         let (heading, top) = (TextStyle::new(self.fonts.title, INK), outer.y);
-        draw_lines(surface, title, heading, dvec2(middle, top), self.text_width);
+        // In the middle of the plot box, as far as that leaves room.
+        let within = |half: f64| middle.min(outer.right() - half).max(outer.x + half);
+        let lines = font::wrap(title, heading.em, self.text_width);
+        let widths = lines.iter().map(|line| font::width(line, heading.em));
+        let at = dvec2(within(0.5 * widths.fold(0.0, f64::max)), top);
+        draw_lines(surface, title, heading, at, self.text_width);
         self.content.draw(surface, plot);
         let mut below = plot.bottom() + self.content.margins(plot.width, plot.height).bottom;
-        let half = 0.5 * self.legend.width;
-        let centre = middle.min(outer.right() - half).max(outer.x + half);
-        self.legend.draw(surface, dvec2(centre, below));
+        self.legend
+            .draw(surface, dvec2(within(0.5 * self.legend.width), below));
         below += self.legend.height;
         let x = match style.align {
             Align::Left => outer.x + 4.0,
@@ -612,6 +616,18 @@ mod tests {
         let [x, y] = place(&figure, [0.25, 0.5]);
         assert!(has_near(&picture, BLUE, [x + 2.5, y + 2.5], 0.3));
         assert!(!has_near(&picture, BLUE, place(&figure, [0.4, 0.5]), 2.0));
+    }
+
+    #[test]
+    fn a_curve_of_one_point_is_seen() {
+        let one = Series::new("one", vec![[0.5, 0.25]]);
+        let figure = Figure::from(unit_square("").with_curves([one]));
+        assert!(has_near(
+            &picture(&figure),
+            BLUE,
+            place(&figure, [0.5, 0.25]),
+            1.0
+        ));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::axis::{Axis, Window};
 use crate::colour::Colour;
 use crate::drawable::Drawable;
 use crate::error::{Error, Result};
-use crate::geom::{Margins, Rect, clip_polyline, thin};
+use crate::geom::{Margins, Rect, clip_polyline, disc, thin};
 use crate::legend::LegendEntry;
 use crate::style::{Fonts, LineStyle, Marker};
 use crate::surface::Surface;
@@ -140,6 +140,9 @@ impl LineChart {
     }
 }
 
+/// So many markers of a line are all drawn, however near to each other.
+const FEW: usize = 12;
+
 /// A line chart with the ends of its axes.
 pub(crate) struct Plot<'a> {
     chart: &'a LineChart,
@@ -172,6 +175,12 @@ impl Drawable for Plot<'_> {
                     .iter()
                     .map(|&p| self.axes.window.place(&plot, p))
                     .collect();
+                // A line of one point would not be seen.
+                if let ([one], None) = (&placed[..], entry.marker)
+                    && bounds.contains(*one)
+                {
+                    surface.fill(&[disc(*one, series.width)], colour);
+                }
                 if entry.style != LineStyle::None {
                     for piece in clip_polyline(&thin(&placed, 0.2), &bounds) {
                         surface.dashed(&piece, series.width, colour, entry.style.pattern());
@@ -180,8 +189,8 @@ impl Drawable for Plot<'_> {
                 symbols.extend(placed.into_iter().filter(|&p| bounds.contains(p)));
             }
             if let Some(marker) = entry.marker {
-                // Along a line some of them do.
-                if entry.style != LineStyle::None {
+                // Along a line of many some of them do.
+                if entry.style != LineStyle::None && symbols.len() > FEW {
                     symbols = thin(&symbols, 11.0);
                 }
                 surface.markers(marker, &symbols, colour);

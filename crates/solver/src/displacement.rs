@@ -41,8 +41,8 @@ pub(crate) fn window(u: f64) -> f64 {
     weight / (weight + EDGE)
 }
 
-/// How many interface widths all but a fiftieth of the interface of `u`, which may vanish, is from that of `other`: where `u` changes its sign, the
-/// other phase field says how far its own interface is. At most five, where there is none of it nearby.
+/// The largest distance from the interface of `u` to that of `other` in interface widths, but for a fiftieth of it, which may vanish. It is what
+/// `other` says of its own interface where `u` changes its sign: about five where there is none nearby. Zero if `u` has no interface.
 pub fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
     const VANISHING: f64 = 0.02;
     let mut depths = other.where_zero(u);

@@ -1,4 +1,4 @@
-//! What nearly every file needs of the libraries.
+//! What nearly every file needs of the libraries, and of the root of this crate.
 
 pub use std::collections::{BTreeMap, BTreeSet};
 pub use std::f64::consts::PI;

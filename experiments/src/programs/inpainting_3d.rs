@@ -1,6 +1,6 @@
 use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, write_snapshots};
+use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, measured, write_snapshots};
 use render::Tube;
 
 const TITLE: &str = "Inpainting of surfaces";
@@ -149,7 +149,8 @@ fn note(one: &Inpainted<'_, 3>, n: usize) -> String {
     });
     format!(
         "n = {n}, ε = 2/n, inner step 1/n², τ = 2⁻²¹, doubled every step from step {} on; only the values in the green box move.{end} \
-         w: Willmore energy with the implicit finite-element step.",
-        alike + 1
+         w: Willmore energy {}.",
+        alike + 1,
+        measured(one.trajectory.case.grid())
     )
 }

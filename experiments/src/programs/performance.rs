@@ -94,7 +94,8 @@ pub fn program(options: &Options) -> Result<()> {
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
-        all.push(Measurement::of("cross", &case, &mut session, turns)?);
+        let shape = run.either("disc", "cross");
+        all.push(Measurement::of(shape, &case, &mut session, turns)?);
     }
     let stored = options.storage.measure(&mut session)?;
     for (name, n, steps) in solids {

@@ -6,6 +6,8 @@ use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
 const TITLE: &str = "Spheres by the network for surfaces";
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [32, 64];
+/// Side of the box: the largest sphere, too, is seven interface widths from it.
+const BOX: f64 = 1.25;
 const RADII: [f64; 6] = [0.15, 0.2, 0.25, 0.3, 0.35, 0.4];
 /// Steps of mean curvature flow after which errors are reported; the smallest sphere vanishes after 23 at n = 64.
 const MCF_STEPS: [usize; 3] = [1, 4, 8];
@@ -67,7 +69,7 @@ pub fn program(options: &Options) -> Result<()> {
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
     let variants: Vec<_> = schemes.map(|&scheme| (Method::Hybrid, scheme)).collect();
-    let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
+    let setting = Setting::new(&options.figure, &variants, CELLS, BOX)?;
     let end = MCF_STEPS[LAST] as f64 * setting.scales.mcf_step;
     let message =
         "the smallest sphere vanishes within the steps of mean curvature flow: give more --cells";

@@ -228,26 +228,41 @@ fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> R
         }
         Ok(())
     })?;
+    let hybrid = contenders.iter().find(|timing| timing.row.key == "hybrid");
+    let hybrid = hybrid.map_or(Vec::new(), |hybrid| timing::seconds(&hybrid.run));
     for timing in &mut contenders {
-        timing.numbers = timing.numbers();
+        timing.numbers = timing.numbers(&hybrid);
     }
     Ok(contenders)
 }
 
 impl Timing {
-    /// Time and work, with the time of all steps in seconds: measured, or with the mean of the later half of the measured steps for each
-    /// of the rest. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
-    fn numbers(&self) -> Numbers {
+    /// Time and work, with the time of all steps in seconds: measured, or, for the rest, as many times as long as the hybrid scheme takes as the
+    /// later half of the measured steps is. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+    fn numbers(&self, hybrid: &[f64]) -> Numbers {
         let (mut numbers, seconds) = (timing::numbers(&self.run), timing::seconds(&self.run));
         let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
-        let later = &seconds[count / 2..];
-        let late = later.iter().sum::<f64>() / later.len().max(1) as f64;
+        let sum = |seconds: &[f64]| seconds.iter().sum::<f64>();
+        // Where not all of its steps are measured either, steps are taken to be alike.
+        let alike = [1.0; STEPS];
+        let profile = if hybrid.len() == STEPS {
+            hybrid
+        } else {
+            &alike
+        };
+        let ratio =
+            sum(&seconds[count / 2..]) / sum(&profile[count / 2..count]).max(f64::MIN_POSITIVE);
+        let rest = if count < STEPS {
+            ratio * sum(&profile[count..])
+        } else {
+            0.0
+        };
         let inner = self.run.statistics().unwrap_or_default();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
         numbers.extend([
             ("measured_steps", count as f64),
             ("measured_seconds", measured),
-            ("seconds", measured + late * (STEPS - count) as f64),
+            ("seconds", measured + rest),
             ("inner_cg_per_step", per_step(inner.cg)),
             ("factorizations_per_step", per_step(inner.factorizations)),
         ]);

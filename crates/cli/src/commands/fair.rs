@@ -46,7 +46,7 @@ impl FairOptions {
 
     pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
         let mut reader = self.flow.run.reader(messages)?;
-        reader.allows_loss = self.allow_loss;
+        reader.allows_loss = Some(self.allow_loss);
         let loaded = match reader.source.clone() {
             Source::Mesh(path) => return self.load_mesh(&path, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
@@ -144,7 +144,7 @@ impl FairOptions {
             self.noise = Some(noise);
         }
         let mut reader = self.flow.run.reader(messages)?;
-        reader.allows_loss = self.allow_loss;
+        reader.allows_loss = Some(self.allow_loss);
         reader.own(own, path)
     }
 }

@@ -67,9 +67,11 @@ pub fn run(
     stored: Option<(StoredRun, Option<usize>)>,
 ) -> Result<()> {
     let input = command.options().input.clone();
+    let mut is_first = true;
     let of_label = |label| {
         // A signal may have come after the last step of the label before.
-        if Interrupt::catch()?.requested() {
+        if !std::mem::take(&mut is_first) && Interrupt::catch()?.requested() {
+            messages.note(&format!("interrupted before label {label}"));
             return Err(Error::Interrupted);
         }
         let mut one = command.clone();
@@ -204,7 +206,7 @@ impl Job {
             Some(steps) => {
                 notes["steps"] = steps.into();
                 if stored.is_finished() {
-                    notes["saved"] = true.into();
+                    notes["was_over"] = true.into();
                 }
                 let with = (checkpoints, notes);
                 let ends = |name: &str| presentation::is_of_end(name, plan.extension());

@@ -17,8 +17,8 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
         refuse!("{path} names no command that makes runs");
     };
     let stored_options = command.options();
-    // A run that was over has written the file of --save itself.
-    let was_over = stored.is_finished() || engine::notes(&stored)["saved"] == true;
+    // A run that was over may have written the file of --save itself.
+    let was_over = stored.is_finished() || engine::notes(&stored)["was_over"] == true;
     stored_options.force.force = options.force.force || was_over;
     if !stored.is_finished() || options.steps.is_some() {
         return flow::run(command, messages, Some((stored, options.steps)));

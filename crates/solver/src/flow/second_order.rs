@@ -35,7 +35,8 @@ pub struct StepEstimates {
     pub error: Option<f64>,
     /// How far the interface moved.
     pub motion: f64,
-    /// The longer of the displacements of the two stages, from `u_k` to `U` and from there to `u_{k+1}`.
+    /// The longer of the displacements of the two stages, from `u_k` to `U` and from there to `u_{k+1}`; also how far away interface is that
+    /// has vanished or appeared in one of them ([`widths_between`](crate::widths_between)).
     pub displacement: f64,
 }
 
@@ -153,11 +154,14 @@ impl<const D: usize> WillmoreFlow<D> {
         const SECOND: f64 = (2.0 - 3.0 * GAMMA) / (6.0 * (1.0 - GAMMA));
         /// Steps that have no estimate.
         const WITHOUT: usize = 3;
+        /// Interface that is so many widths from any other has none to which it could have moved.
+        const AWAY: f64 = 2.0;
         let unit = 4.0 * self.params.eps / 3.0;
         let between =
             |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
-        // What is gone in the middle of the step, or was not there before, is seen from the other ends.
-        let [gone, new] = [before, after].map(|end| self.params.eps * widths_between(end, middle));
+        // Interface of u_k that is gone in U, and of u_{k+1} that is not yet there, is no part of that in the middle: it is seen from those ends.
+        let away = |end| Some(widths_between(end, middle)).filter(|widths| *widths > AWAY);
+        let [gone, new] = [before, after].map(|end| away(end).unwrap_or(0.0) * self.params.eps);
         let error = match &self.rate {
             Some(start) if self.step >= WITHOUT => {
                 let stages = first.zip_map(second, |first, second| {
