@@ -13,7 +13,7 @@ const PAPERS: &str = "paper, other machines [s]";
 
 /// Wall time of 128 Willmore steps of the cross (eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7) by the hybrid scheme and by
 /// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
-/// inner iterations. Rows that exceed the budget are extrapolated from the steps done, and say so.
+/// inner iterations. Rows that exceed the budget are extrapolated from the steps done, by the times that the hybrid scheme takes, and say so.
 #[derive(Parser, Debug)]
 #[command(name = "timing_tables", version)]
 pub struct Options {
