@@ -150,7 +150,12 @@ fn mrc_of_all_kinds() {
 #[test]
 fn stacks_of_all_kinds() {
     let imagej = "ImageJ=1.54f\nimages=3\nslices=3\nunit=micron\nspacing=2.0\n";
-    for (description, z) in [(imagej, 2.0), ("a photograph", 0.25)] {
+    let without_distance = "ImageJ=1.54f\nimages=3\nslices=3\nunit=micron\n";
+    for (description, z) in [
+        (imagej, 2.0),
+        (without_distance, 1.0),
+        ("a photograph", 0.25),
+    ] {
         let volume = decode(&stack(description)).unwrap();
         assert_values(&volume, description);
         assert_near(volume.position([1.0, 1.0, 1.0]), [0.5, 0.25, z]);

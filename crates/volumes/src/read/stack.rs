@@ -156,6 +156,8 @@ fn described(reader: &mut Decoder<impl Read + Seek>) -> Result<(Option<u64>, DVe
     };
     let (x, y) = (side(Tag::XResolution), side(Tag::YResolution));
     let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
-    let z = spacing.map(f64::abs).filter(|&z| z > 0.0).unwrap_or(y);
+    // ImageJ does not note a distance of 1.
+    let usual = if is_by_imagej { 1.0 } else { y };
+    let z = spacing.map(f64::abs).filter(|&z| z > 0.0).unwrap_or(usual);
     Ok((count("images"), DVec3::new(x, y, z)))
 }
