@@ -29,7 +29,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// - MRC and CCP4 maps of modes 0, 1, 2 and 6, with cells of right angles, also compressed: the axes are as `MAPC`, `MAPR` and `MAPS` say,
 ///   and the first voxel is at `ORIGIN`, or else at `NXSTART`, `NYSTART`, `NZSTART`.
 /// - Stacks of TIFF images with one number per pixel. The axes are columns, rows and pages; pixels have the sizes of the resolution,
-///   in millimetres where that is per inch or centimetre, and pages of ImageJ the distance that it notes, or else 1, those of other programs
+///   in millimetres where that is per inch, as without a unit, or centimetre, and pages of ImageJ the distance that it notes, or else 1, those of other programs
 ///   that of rows.
 ///
 /// Memory: four times the bytes of the voxels, of which there may be as many as the file has, or 2^31 if it has fewer, and 1 GiB.

@@ -118,6 +118,21 @@ pub fn stack(description: &str) -> Vec<u8> {
     file.into_inner()
 }
 
+/// A stack whose pages have another tag or value in place of a tag with one short number.
+pub fn retagged(stack: &[u8], old: [u16; 2], new: [u16; 2]) -> Vec<u8> {
+    let entry = |[tag, value]: [u16; 2]| {
+        let [tag, kind, value] = [tag, 3, value].map(u16::to_ne_bytes);
+        [&tag[..], &kind, &1_u32.to_ne_bytes(), &value].concat()
+    };
+    let (old, new, mut bytes) = (entry(old), entry(new), stack.to_vec());
+    for at in 0..bytes.len() {
+        if bytes[at..].starts_with(&old) {
+            bytes[at..at + new.len()].copy_from_slice(&new);
+        }
+    }
+    bytes
+}
+
 /// The same values in wider numbers, compressed.
 pub fn wide_stacks() -> [Vec<u8>; 2] {
     let compressed = || tiff::encoder::Compression::Lzw;

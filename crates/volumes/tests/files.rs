@@ -2,7 +2,9 @@
 
 use volumes::{Error, FormatError, Inside, Volume, decode, is_stack, read, write};
 
-use crate::common::{Header, ROWS, SIZE, mrc, nifti, nifti_2, packed, stack, values, wide_stacks};
+use crate::common::{
+    Header, ROWS, SIZE, mrc, nifti, nifti_2, packed, retagged, stack, values, wide_stacks,
+};
 
 fn assert_values(volume: &Volume, name: &str) {
     assert_eq!(volume.size(), SIZE, "{name}");
@@ -159,6 +161,14 @@ fn stacks_of_all_kinds() {
         let volume = decode(&stack(description)).unwrap();
         assert_values(&volume, description);
         assert_near(volume.position([1.0, 1.0, 1.0]), [0.5, 0.25, z]);
+    }
+    // Without a unit, for which there is a number of the page.
+    for (description, sides) in [
+        (imagej, [0.5, 0.25, 2.0]),
+        ("a photograph", [12.7, 6.35, 6.35]),
+    ] {
+        let volume = decode(&retagged(&stack(description), [296, 1], [297, 1])).unwrap();
+        assert_near(volume.position([1.0, 1.0, 1.0]), sides);
     }
     for bytes in wide_stacks() {
         let volume = decode(&bytes).unwrap();

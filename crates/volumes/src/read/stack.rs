@@ -140,8 +140,9 @@ fn described(reader: &mut Decoder<impl Read + Seek>) -> Result<(Option<u64>, DVe
             return bad("number of channels or times", &n, "1: save one of them");
         }
     }
+    // Without one it is the inch, by TIFF 6.0.
     let unit = reader.find_tag_unsigned::<u16>(Tag::ResolutionUnit)?;
-    let unit = match unit.and_then(ResolutionUnit::from_u16) {
+    let unit = match unit.map_or(Some(ResolutionUnit::Inch), ResolutionUnit::from_u16) {
         Some(ResolutionUnit::Centimeter) if !is_by_imagej => CENTIMETRE,
         Some(ResolutionUnit::Inch) if !is_by_imagej => INCH,
         _ => 1.0,
