@@ -22,6 +22,10 @@ fn assert_near(found: [f64; 3], expected: [f64; 3]) {
     assert!(close, "{found:?} {expected:?}");
 }
 
+fn with_white_as_zero(stack: &[u8]) -> Vec<u8> {
+    retagged(stack, [262, 1], [262, 0])
+}
+
 /// The bytes of the values in numbers of that type.
 fn numbers<const N: usize>(number: impl Fn(u8) -> [u8; N]) -> Vec<u8> {
     values().into_iter().flat_map(number).collect()
@@ -174,7 +178,11 @@ fn stacks_of_all_kinds() {
         let volume = decode(&bytes).unwrap();
         assert_values(&volume, "wide");
         assert_near(volume.position([1.0, 1.0, 1.0]), [1.0; 3]);
+        let volume = decode(&with_white_as_zero(&bytes)).unwrap();
+        assert_values(&volume, "wide, white is zero");
     }
+    let volume = decode(&with_white_as_zero(&stack(imagej))).unwrap();
+    assert_values(&volume, "white is zero");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.tif");
     std::fs::write(&path, stack(imagej)).unwrap();

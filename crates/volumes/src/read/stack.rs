@@ -8,7 +8,7 @@ use files::Number;
 use glam::{DAffine3, DVec3};
 use tiff::decoder::ifd::Value;
 use tiff::decoder::{BufferLayoutPreference, Decoder, DecodingSampleType, Limits};
-use tiff::tags::{ResolutionUnit, Tag};
+use tiff::tags::{PhotometricInterpretation, ResolutionUnit, Tag};
 use tiff::{ColorType, TiffResult};
 
 use super::length;
@@ -61,12 +61,18 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     limits.intermediate_buffer_size = LARGEST_PAGE;
     let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
     let (noted, sides) = described(&mut reader)?;
-    let (first, element) = page(&mut reader)?;
+    let (first, element, inverted) = page(&mut reader)?;
+    let scale = if inverted {
+        as_stored(element)?
+    } else {
+        [1.0, 0.0]
+    };
     let (mut data, mut pages) = (Vec::new(), 0);
     loop {
-        let (size, kind) = page(&mut reader)?;
-        if (size, kind) != (first, element) {
-            let shown = format!("{} x {} as {kind:?}", size[0], size[1]);
+        let (size, kind, white_is_zero) = page(&mut reader)?;
+        if (size, kind, white_is_zero) != (first, element, inverted) {
+            let zero = if white_is_zero { "white" } else { "black" };
+            let shown = format!("{} x {} as {kind:?}, zero is {zero}", size[0], size[1]);
             return bad("page", &shown, "like the first one");
         }
         pages += 1;
@@ -92,13 +98,29 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         bytes: data,
         element,
         big_endian: cfg!(target_endian = "big"),
-        scale: [1.0, 0.0],
+        scale,
     };
     Volume::new(size, DAffine3::from_scale(sides), voxels)
 }
 
-/// Columns and rows of the page, and its numbers.
-fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), FormatError> {
+/// The scale that takes numbers back to those in the file where white is zero: the crate inverts them.
+fn as_stored(element: Number) -> Result<[f64; 2], FormatError> {
+    let largest = match element {
+        Number::U8 => f64::from(u8::MAX),
+        Number::U16 => f64::from(u16::MAX),
+        Number::U32 => f64::from(u32::MAX),
+        Number::F32 | Number::F64 => 1.0,
+        // These have no inverse, or no exact one.
+        _ => {
+            let shown = format!("{element:?} with white as zero");
+            return bad("kind of numbers", &shown, "U8, U16, U32, F32 or F64");
+        }
+    };
+    Ok([-1.0, largest])
+}
+
+/// Columns and rows of the page, its numbers, and whether white is zero.
+fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number, bool), FormatError> {
     let colours = reader.colortype()?;
     let ColorType::Gray(8 | 16 | 32 | 64) = colours else {
         let shown = format!("{colours:?}");
@@ -121,7 +143,9 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number), Fo
     let (width, height) = reader.dimensions()?;
     let size = [width, height].map(u64::from);
     length([size[0], size[1], 2], element, 2 * LARGEST_PAGE as u64)?;
-    Ok((size, element))
+    let meaning = reader.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?;
+    let white_is_zero = meaning == Some(PhotometricInterpretation::WhiteIsZero.to_u16());
+    Ok((size, element, white_is_zero))
 }
 
 /// The number of pages, if ImageJ notes it in the description of the first one, and the sides of voxels.
