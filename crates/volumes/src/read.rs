@@ -28,9 +28,9 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 ///   their sizes alone, in the units of the file. Values are scaled by `scl_slope` and `scl_inter`.
 /// - MRC and CCP4 maps of modes 0, 1, 2 and 6, with cells of right angles, also compressed: the axes are as `MAPC`, `MAPR` and `MAPS` say,
 ///   and the first voxel is at `ORIGIN`, or else at `NXSTART`, `NYSTART`, `NZSTART`.
-/// - Stacks of TIFF images with one number per pixel, as it is in the file also where white is zero. The axes are columns, rows and pages; pixels have the sizes of the resolution,
-///   in millimetres where that is per inch, as without a unit, or centimetre, and pages of ImageJ the distance that it notes, or else 1, those of other programs
-///   that of rows.
+/// - Stacks of TIFF images with one number per pixel, as it is in the file also where white is zero. The axes are columns, rows and pages;
+///   pixels have the sizes of the resolution, in millimetres where that is per inch, as without a unit, or centimetre. Pages have the
+///   distance of rows, and those of ImageJ the one that it notes, or else 1; its values are calibrated by a straight line.
 ///
 /// Memory: four times the bytes of the voxels, of which there may be as many as the file has, or 2^31 if it has fewer, and 1 GiB.
 /// Truncated and overlong files are refused, and values that are not finite.

@@ -183,6 +183,13 @@ fn stacks_of_all_kinds() {
     }
     let volume = decode(&with_white_as_zero(&stack(imagej))).unwrap();
     assert_values(&volume, "white is zero");
+    // Numbers with a sign, as ImageJ notes them.
+    let signed = stack("ImageJ=1.54f\nimages=3\ncf=0\nc0=-40.0\nc1=2.0\nvunit=Gray Value\n");
+    for bytes in [with_white_as_zero(&signed), signed] {
+        let volume = decode(&bytes).unwrap();
+        let ends = [volume.value([0; 3]) + 40.0, volume.value([4, 3, 2]) - 78.0];
+        assert!(ends.iter().all(|x| x.abs() < 1e-12), "{ends:?}");
+    }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.tif");
     std::fs::write(&path, stack(imagej)).unwrap();
@@ -292,6 +299,10 @@ fn bad_files_are_refused_with_numbers() {
         (
             stack("ImageJ=1\nimages=3\nchannels=3\n"),
             "channels or times",
+        ),
+        (
+            stack("ImageJ=1\nimages=3\ncf=3\nc0=1\nc1=2\n"),
+            "calibration function of the TIFF header is 3",
         ),
         (
             crate::common::nifti(16, false, &numbers(nan)),

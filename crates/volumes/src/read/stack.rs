@@ -60,12 +60,13 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     limits.decoding_buffer_size = LARGEST_PAGE;
     limits.intermediate_buffer_size = LARGEST_PAGE;
     let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
-    let (noted, sides) = described(&mut reader)?;
     let (first, element, inverted) = page(&mut reader)?;
+    let (noted, sides, [slope, shift]) = described(&mut reader, element)?;
     let scale = if inverted {
-        as_stored(element)?
+        let [sign, largest] = as_stored(element)?;
+        [slope * sign, slope * largest + shift]
     } else {
-        [1.0, 0.0]
+        [slope, shift]
     };
     let (mut data, mut pages) = (Vec::new(), 0);
     loop {
@@ -148,8 +149,11 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number, boo
     Ok((size, element, white_is_zero))
 }
 
-/// The number of pages, if ImageJ notes it in the description of the first one, and the sides of voxels.
-fn described(reader: &mut Decoder<impl Read + Seek>) -> Result<(Option<u64>, DVec3), FormatError> {
+/// The number of pages, if ImageJ notes it in the description of the first one, the sides of voxels, and the scale of their values.
+fn described(
+    reader: &mut Decoder<impl Read + Seek>,
+    element: Number,
+) -> Result<(Option<u64>, DVec3, [f64; 2]), FormatError> {
     let text = reader.get_tag_ascii_string(Tag::ImageDescription);
     let text = text.unwrap_or_default();
     let is_by_imagej = text.starts_with("ImageJ=");
@@ -180,9 +184,28 @@ fn described(reader: &mut Decoder<impl Read + Seek>) -> Result<(Option<u64>, DVe
         if side.is_normal() { side } else { 1.0 }
     };
     let (x, y) = (side(Tag::XResolution), side(Tag::YResolution));
-    let spacing = note("spacing").and_then(|n| n.parse::<f64>().ok());
+    let number = |name| note(name).and_then(|n| n.parse::<f64>().ok());
+    let spacing = number("spacing");
     // ImageJ does not note a distance of 1.
     let usual = if is_by_imagej { 1.0 } else { y };
     let z = spacing.map(f64::abs).filter(|&z| z > 0.0).unwrap_or(usual);
-    Ok((count("images"), DVec3::new(x, y, z)))
+    let scale = match element {
+        Number::U8 | Number::U16 => calibrated(["cf", "c0", "c1"].map(number))?,
+        _ => [1.0, 0.0],
+    };
+    Ok((count("images"), DVec3::new(x, y, z), scale))
+}
+
+/// The scale by the function that ImageJ notes for numbers of up to 16 bits, and its first two coefficients. Numbers with a sign are a
+/// straight line of those without.
+fn calibrated(noted: [Option<f64>; 3]) -> Result<[f64; 2], FormatError> {
+    match noted {
+        [Some(0.0), Some(shift), Some(slope)] => Ok([slope, shift]),
+        // None is also noted as 20, or without coefficients.
+        [None | Some(0.0 | 20.0), ..] => Ok([1.0, 0.0]),
+        [Some(function), ..] => {
+            let requirement = "0, a straight line; convert the stack to 32 bits in ImageJ";
+            bad("calibration function", &function, requirement)
+        }
+    }
 }
