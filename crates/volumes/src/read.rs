@@ -62,7 +62,11 @@ fn unpacked(mut packed: impl Read, limit: u64) -> Result<Volume, FormatError> {
     let mut bytes = Vec::new();
     let mut head = packed.by_ref().take(HEAD as u64);
     head.read_to_end(&mut bytes).map_err(damaged)?;
-    let header = nifti::header(&bytes).or_else(|| mrc::header(&bytes));
+    let header = match nifti::header(&bytes) {
+        // What begins with the number of columns may begin as NIfTI does.
+        refused @ (None | Some(Err(_))) => mrc::header(&bytes).or(refused),
+        header => header,
+    };
     let start = bytes.iter().take(8).copied().collect();
     let header = header.ok_or(FormatError::Unknown { start })??;
     let length = length(header.size, header.element, limit)?;

@@ -142,6 +142,11 @@ fn mrc_of_all_kinds() {
         // Columns are along z, sections along x.
         assert_near(volume.position([1.0, 1.0, 1.0]), [3.0, 1.0, 5.5]);
     }
+    // As many columns as a NIfTI header has bytes.
+    let mut header = Header::new(0, false);
+    header.bytes = mrc(0, false, &[7; 348 * 4 * 3]);
+    header.put(0, 348_i32.to_le_bytes());
+    assert_eq!(decode(&header.bytes).unwrap().size(), [348, 4, 3]);
     // Without an origin, the numbers of the first voxels count.
     let mut header = Header::new(0, false);
     header.bytes = mrc(0, false, &values());
