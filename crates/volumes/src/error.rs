@@ -19,6 +19,15 @@ pub enum Error {
     NothingInside { what: String, low: f64, high: f64 },
     #[error("{path} must end in .nii or .nii.gz: volumes are written as NIfTI", path = path.display())]
     UnknownFormat { path: PathBuf },
+    #[error(
+        "{path} cannot be written: the volume has {} x {} x {} voxels, and NIfTI-1 has up to {most} along each axis; take fewer",
+        size[0], size[1], size[2], path = path.display()
+    )]
+    TooManyVoxels {
+        path: PathBuf,
+        size: [usize; 3],
+        most: usize,
+    },
     #[error(transparent)]
     Surfaces(#[from] surfaces::Error),
 }

@@ -11,9 +11,11 @@ use crate::{Error, Volume};
 /// Length of the header, and where voxels begin behind it.
 const HEADER: usize = 348;
 const START: usize = 352;
+/// Most voxels along an axis.
+const MOST: usize = i16::MAX as usize;
 
 /// Writes labels of 0 to 255 as NIfTI-1, atomically, to a name that ends in `.nii`, or compressed in `.nii.gz`. Other values go to the
-/// nearest label.
+/// nearest label. There may be up to 32767 voxels along each axis.
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
     let path = path.as_ref();
     let ends = |path: &Path, with: &str| {
@@ -24,6 +26,13 @@ pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
     let packed = ends(path, "gz") && stem.is_some_and(|stem| ends(stem, "nii"));
     if !packed && !ends(path, "nii") {
         return Err(Error::UnknownFormat { path: path.into() });
+    }
+    if volume.size().iter().any(|&n| n > MOST) {
+        return Err(Error::TooManyVoxels {
+            path: path.into(),
+            size: volume.size(),
+            most: MOST,
+        });
     }
     Ok(files::write_atomically(path, |out| {
         if packed {

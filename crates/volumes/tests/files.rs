@@ -219,6 +219,10 @@ fn labels_are_written_and_read_back() {
     assert!(plain == 352 + 60 && packed < plain);
     let error = write(folder.path().join("a.mrc"), &volume).unwrap_err();
     assert!(matches!(error, Error::UnknownFormat { .. }), "{error}");
+    let long = Volume::of_labels([2, 32768, 2], [0.0; 3], [1.0; 3], vec![1; 1 << 17]).unwrap();
+    let error = write(folder.path().join("long.nii"), &long).unwrap_err();
+    let part = "2 x 32768 x 2 voxels, and NIfTI-1 has up to 32767";
+    assert!(error.to_string().contains(part), "{error}");
     let error = read(folder.path().join("none.nii")).unwrap_err();
     assert!(matches!(error, Error::Io(_)), "{error}");
 }
