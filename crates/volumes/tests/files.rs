@@ -115,6 +115,11 @@ fn nifti_without_rows_is_placed_by_quaternion_and_sides() {
         header.put(116, (-3_f32).to_le_bytes());
     });
     assert!((scaled.value([1, 1, 0]) - 0.0).abs() < 1e-12);
+    let unscaled = with(&|header| {
+        header.put(112, f32::NAN.to_le_bytes());
+        header.put(116, f32::NAN.to_le_bytes());
+    });
+    assert_values(&unscaled, "a slope that is not a number");
 }
 
 #[test]

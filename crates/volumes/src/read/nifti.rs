@@ -68,7 +68,7 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
     }
     let scale = match fields.numbers::<2>(at(112, 176), real) {
         // Without a slope there is none.
-        [0.0, _] => [1.0, 0.0],
+        [slope, _] if slope == 0.0 || slope.is_nan() => [1.0, 0.0],
         [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
         [slope, shift] => return bad("scl_slope", &format!("{slope} {shift}"), "finite"),
     };
