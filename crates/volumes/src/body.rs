@@ -22,7 +22,7 @@ const SPECK: f64 = 8.0;
 /// Which voxels are inside.
 #[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Inside {
-    /// Those of this value.
+    /// Those of this value, up to rounding.
     #[display("labelled {_0}")]
     Label(f64),
     /// Those of larger values; the surface is where the values, interpolated, are this one.
@@ -33,8 +33,8 @@ pub enum Inside {
 impl Inside {
     fn holds(self, value: f64) -> bool {
         match self {
-            // Labels are whole.
-            Self::Label(label) => (value - label).abs() < 0.5,
+            // Scaled values are rounded; neighbours of large labels are others.
+            Self::Label(label) => (value - label).abs() <= (1e-6 * label.abs()).clamp(1e-6, 0.4),
             Self::Above(threshold) => value > threshold,
         }
     }

@@ -366,6 +366,14 @@ fn labels_are_counted() {
     let halves = numbers(|v| (0.5 * f32::from(v)).to_le_bytes());
     let volume = decode(&nifti(16, false, &halves)).unwrap();
     assert_eq!(volume.labels(), None);
+    // Neither fractions nor neighbours of large labels belong to a label.
+    let quarters = numbers(|v| (0.25 * f32::from(v)).to_le_bytes());
+    let large = numbers(|v| (600_000_000 + u32::from(v)).to_le_bytes());
+    for (data_type, voxels, label) in [(16, quarters, 1.0), (768, large, 600_000_004.0)] {
+        let one = decode(&nifti(data_type, false, &voxels)).unwrap();
+        let body = one.body(Inside::Label(label)).unwrap();
+        assert!((body.surface.volume() / 9.0 - 1.0).abs() < 1e-6, "{body:?}");
+    }
     let error = volume.body(Inside::Label(99.0)).unwrap_err();
     assert_eq!(
         error.to_string(),
