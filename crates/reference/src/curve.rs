@@ -9,6 +9,9 @@ use crate::flow::Nodes;
 use crate::spectral::{Coefficients, Grid, Series, collect, power_sum};
 use crate::{Error, Flow};
 
+/// Most points of a whole curve.
+pub(crate) const MOST_POINTS: usize = 1 << 20;
+
 /// A smooth simple closed curve at a time, counterclockwise, by its tangent angle `theta` over `alpha = 2 pi s / length`, where `s`
 /// is the arc length: `theta(alpha) - alpha` is a Fourier series, so that all measures are exact to rounding.
 #[derive(Clone)]
@@ -160,7 +163,6 @@ impl Curve {
     pub(crate) fn fitted(&self, tolerance: f64) -> Result<Self, Error> {
         const NEGLIGIBLE: f64 = 1e-4; // of the tolerance
         const FEWEST_POINTS: usize = 32;
-        const MOST_POINTS: usize = 1 << 20;
         let points = self.grid.points;
         let (fewer, more) = if points.is_power_of_two() {
             (points / 4 * 3, points / 2 * 3)

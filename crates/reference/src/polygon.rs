@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use realfft::num_complex::Complex;
 
 use crate::corner::Corner;
+use crate::curve::MOST_POINTS;
 use crate::spectral::{Coefficients, Grid, Series, collect};
 use crate::{Curve, Error, Flow};
 
@@ -81,7 +82,14 @@ pub(crate) fn rounded(
     }
     let gains = collect(edges.len(), |i| width * corners[kinds[i]].gain());
     let (scale, alphas) = along(&edges, &gains);
+    let time = width.powi(flow.order());
     let points = 2.0 * Corner::LARGEST_WAVE * scale / width / folds as f64;
+    if points > (MOST_POINTS / folds) as f64 {
+        return Err(Error::Unresolved {
+            points: MOST_POINTS,
+            time,
+        });
+    }
     let grid = Grid::new(folds, (points as usize).next_power_of_two());
     let transforms: Vec<_> = corners.iter().map(Corner::transform).collect();
     let coefficient = |j: usize| {
@@ -105,7 +113,7 @@ pub(crate) fn rounded(
         angle,
         scale,
         centre: [centre.re, centre.im],
-        time: width.powi(flow.order()),
+        time,
     })
 }
 

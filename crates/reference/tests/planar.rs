@@ -189,6 +189,13 @@ fn what_cannot_be_computed_is_refused() {
     let square = Shape::rectangle(1.0, 1.0).unwrap();
     let early = evolve(&square, Flow::Willmore, &[0.0], &ACCURACY);
     assert!(matches!(early, Err(Error::TooEarly { .. })));
+    // Its rounded corners would need more points than fit into any memory.
+    let thin = Shape::rectangle(1.0, 1e-12).unwrap();
+    let unresolved = evolve(&thin, Flow::Willmore, &[0.1], &ACCURACY);
+    assert!(matches!(
+        unresolved,
+        Err(Error::Unresolved { points, .. }) if points == 1 << 20
+    ));
     let back = evolve(&square, Flow::Willmore, &[0.2, 0.1], &ACCURACY);
     assert!(matches!(back, Err(Error::TimesNotIncreasing { .. })));
     for (rounding, tolerance) in [(0.1, 1e-8), (f64::NAN, 1e-8), (0.01, 0.0), (0.01, f64::NAN)] {
