@@ -11,6 +11,8 @@ use crate::{Error, Field, Grid, SignedDistance, optimal_profile};
 
 /// Finer grids are searched on at most so many cells a side first.
 const MOST_CELLS: usize = 96;
+/// Searches end where distances differ by so much in a box of side 1.
+const TOLERANCE: f64 = 1e-9;
 
 /// A Clifford torus in space, fitted to a phase field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -63,7 +65,9 @@ impl CliffordTorus {
             };
             // Beyond the positive radii there is no torus, which is no reason to stop.
             let cost = |parameters: &[f64; 6]| distance(parameters).unwrap_or(f64::INFINITY);
-            nelder_mead(cost, start, steps)
+            // In the unit of the distance.
+            let tolerance = TOLERANCE * u.grid().side().powf(1.5);
+            nelder_mead(cost, start, steps, tolerance)
         };
         let found = [0, 1, 2].map(|along| (along, search(coarse.unwrap_or(u), along, start, 1.0)));
         let fits = found.into_iter().filter(|(_, (l2, _))| l2.is_finite());
@@ -139,14 +143,14 @@ fn coarsened(u: &Field<3>, most_cells: usize) -> Result<Option<Field<3>>, Error>
 }
 
 /// The best vertex and its cost after a search by the simplex method of Nelder and Mead, from the simplex of a point and its displacements
-/// along the axes, until the standard deviation of the costs in the simplex is small.
+/// along the axes, until the standard deviation of the costs in the simplex is below the tolerance.
 fn nelder_mead<const N: usize>(
     cost: impl Fn(&[f64; N]) -> f64,
     start: [f64; N],
     steps: [f64; N],
+    tolerance: f64,
 ) -> (f64, [f64; N]) {
     const ITERATIONS: usize = 1000;
-    const TOLERANCE: f64 = 1e-9;
     let vertex = |x: [f64; N]| (cost(&x), x);
     let along = |from: &[f64; N], to: &[f64; N], t: f64| -> [f64; N] {
         std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
@@ -163,7 +167,7 @@ fn nelder_mead<const N: usize>(
         simplex.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let mean = simplex.iter().map(|(cost, _)| cost).sum::<f64>() / (N + 1) as f64;
         let squares: f64 = simplex.iter().map(|(cost, _)| (cost - mean).powi(2)).sum();
-        if (squares / N as f64).sqrt() < TOLERANCE {
+        if (squares / N as f64).sqrt() < tolerance {
             break;
         }
         let (best, second_worst, worst) = (simplex[0], simplex[N - 1], simplex[N]);
@@ -222,13 +226,14 @@ mod tests {
 
     #[test]
     fn a_clifford_torus_is_found_in_any_position() {
-        let grid = Grid::<3>::new(32, 1.0).unwrap();
-        let eps = 2.0 * grid.spacing();
-        for axis in [[0.3, -0.5, 1.0], [1.0, 1.0, -1.0]] {
+        // In any unit of length.
+        for (axis, unit) in [([0.3, -0.5, 1.0], 1.0), ([1.0, 1.0, -1.0], 1e-6_f64)] {
+            let grid = Grid::<3>::new(32, unit).unwrap();
+            let eps = 2.0 * grid.spacing();
             let torus = CliffordTorus {
-                centre: [0.52, 0.47, 0.5],
+                centre: [0.52, 0.47, 0.5].map(|x| x * unit),
                 axis: normalized(axis),
-                outer_radius: 0.36,
+                outer_radius: 0.36 * unit,
                 l2: 0.0,
             };
             let u = torus.phase_field(&grid, eps).unwrap();
@@ -236,11 +241,12 @@ mod tests {
             assert_eq!(coarse.grid().cells(), 16);
             let after = CliffordTorus::nearest_after(Some(&coarse), &u, eps).unwrap();
             let found = CliffordTorus::nearest(&u, eps).unwrap();
-            assert!(found.l2 < 1e-4 && after.l2 < 1e-4, "{found:?} {after:?}");
-            assert!((found.outer_radius - 0.36).abs() < 1e-4, "{found:?}");
+            let l2 = 1e-4 * unit.powf(1.5);
+            assert!(found.l2 < l2 && after.l2 < l2, "{found:?} {after:?}");
+            assert!((found.outer_radius / unit - 0.36).abs() < 1e-4, "{found:?}");
             assert!(dot(found.axis, torus.axis).abs() > 1.0 - 1e-6, "{found:?}");
             for (a, b) in found.centre.iter().zip(torus.centre) {
-                assert!((a - b).abs() < 1e-4, "{found:?}");
+                assert!((a - b).abs() < 1e-4 * unit, "{found:?}");
             }
             for circle in found.minor_circles(3, 16).unwrap() {
                 for x in circle {
