@@ -19,10 +19,14 @@ const CLAMP: f64 = 1.0 - f64::EPSILON;
 /// and its `atanh`, which most nodes of most fields have.
 const FARTHEST: f64 = 18.368_400_284_838_55;
 
-/// `atanh` of `u`, clamped to `|u| <= 1 - 2^-52`: positive inside, zero on the interface.
+/// `atanh` of `u`, clamped to `|u| <= 1 - 2^-52`: positive inside, zero on the interface. NaN stays NaN.
 pub fn profile_variable(u: f64) -> f64 {
     let size = u.abs();
-    let variable = if size < CLAMP { size.atanh() } else { FARTHEST };
+    let variable = if size >= CLAMP {
+        FARTHEST
+    } else {
+        size.atanh()
+    };
     variable.copysign(u)
 }
 
@@ -111,5 +115,6 @@ mod tests {
         for u in [CLAMP, 1.0, 1.5] {
             assert_eq!(profile_variable(-u).to_bits(), (-FARTHEST).to_bits());
         }
+        assert!(profile_variable(f64::NAN).is_nan());
     }
 }
