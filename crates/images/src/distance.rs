@@ -53,7 +53,7 @@ fn is_inside(segments: &RTree<Line<[f64; 2]>>, [x, y]: [f64; 2]) -> bool {
 /// The distance `s = -(4 eps / 3) atanh u` to the interface of a phase field of width `eps`, interpolated by cubics.
 ///
 /// The interpolant is [`geometry::Stored::spline`]. Near the interface of a phase field that keeps its profile it is the signed distance;
-/// elsewhere it has the right sign. In the box it is periodic; it ends at the faces, beyond which everything is outside.
+/// elsewhere it has the right sign at the nodes. In the box it is periodic; it ends at the faces, beyond which everything is outside.
 pub fn interface(u: &Field<2>, eps: f64) -> Result<impl SignedDistance<2> + use<>, Error> {
     let distance = distances_from_phase_field(u, eps)?;
     Ok(move |x: [f64; 2]| {
