@@ -51,12 +51,14 @@ impl Emitter {
         tensor(id, shape, dtype)
     }
 
-    /// Emit an operation unless it is already there. Output identifiers are chosen here.
+    /// Emit an operation unless it is already there and gives the same numbers again. Output identifiers are chosen here.
     pub(crate) fn emit(&mut self, mut operation: OperationIr) -> Vec<TensorIr> {
         sort_operands(&mut operation);
         detach_outputs(&mut operation);
         let hash = hash(&operation);
-        if let Some(outputs) = self.find(hash, &operation) {
+        if !is_random(&operation)
+            && let Some(outputs) = self.find(hash, &operation)
+        {
             return outputs.to_vec();
         }
         let key = operation.clone();
@@ -492,6 +494,13 @@ impl Emitter {
         let operation = variant(BinaryOpIr { lhs, rhs, out });
         self.emit_one(OperationIr::NumericFloat(a.dtype, operation))
     }
+}
+
+fn is_random(operation: &OperationIr) -> bool {
+    matches!(
+        operation,
+        OperationIr::Float(_, Float::Random(_)) | OperationIr::NumericInt(_, Num::IntRandom(_))
+    )
 }
 
 fn is(value: f64, number: f64) -> bool {

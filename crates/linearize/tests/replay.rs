@@ -1,7 +1,7 @@
 //! Programs as objects: parameters, points, errors, memory, threads.
 
 use crate::common::{self, devices, distance, linearization, random, vec};
-use burn::tensor::{DType, Device, Tensor, TensorData};
+use burn::tensor::{DType, Device, Distribution, Int, Tensor, TensorData};
 use linearize::{Error, Extensions, Graph, Linearization, Value};
 
 /// `Σ c (u − f)² + u⁴`
@@ -99,6 +99,32 @@ fn same_input_same_bytes() {
             format!("{:?}", program.unwrap())
         };
         assert_eq!(program(), program());
+    }
+}
+
+#[test]
+fn random_tensors_are_not_shared() {
+    for device in devices() {
+        let u: Tensor<2> = random(&device, [4, 4], 1, -1.0, 1.0);
+        let graph = Graph::trace(&[(&u).into()], &[], |i| {
+            let (shape, device) = ([4_usize; 2], i.device());
+            let real = || Tensor::<2>::random(shape, Distribution::Default, &device);
+            let wide = Distribution::Uniform(0.0, 1e6);
+            let whole = || {
+                Tensor::<2, Int>::random(shape, wide, &device)
+                    .float()
+                    .cast(DType::F64)
+            };
+            let noise = [real(), real(), whole(), whole()];
+            noise
+                .map(|noise| Value::from(i.variable::<2>(0) + noise))
+                .into()
+        });
+        let mut lin = linearization(&graph.unwrap(), &device);
+        let outputs = lin.at(&[(&u).into()], &[]).unwrap().gradients;
+        for pair in outputs.chunks(2) {
+            assert_ne!(pair[0].to_vec(), pair[1].to_vec());
+        }
     }
 }
 
