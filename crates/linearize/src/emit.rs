@@ -306,6 +306,9 @@ impl Emitter {
     /// `a + b` without an addition, if both are blocks put into zeros and the blocks do not overlap:
     /// the second block can be put into the first tensor. Gradients of shifts are full of these.
     pub(crate) fn join(&mut self, a: &TensorIr, b: &TensorIr) -> Option<TensorIr> {
+        if a.shape != b.shape {
+            return None;
+        }
         let (first, second) = (self.block_in_zeros(a)?, self.block_in_zeros(b)?);
         if !disjoint(&first.ranges, &second.ranges) {
             return None;

@@ -225,6 +225,11 @@ const BROADCASTS: &[Energy<2>] = &[
     ("expand", |u| weigh(bend(&u).expand([3, 4]) * 0.5)),
     ("remainder", |u| weigh(bend(&u).remainder(rows(&u)))),
     ("atan2", |u| weigh(bend(&u).atan2(rows(&u)))),
+    ("add blocks in zeros", |u| {
+        let many = (rows(&u).zeros_like()).slice_assign([1..2, 0..4], bend(&u));
+        let block = bend(&u).slice([0..1, 0..2]);
+        weigh(many + u.zeros_like().slice_assign([0..1, 0..2], block))
+    }),
 ];
 
 #[test]
