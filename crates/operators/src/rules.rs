@@ -24,6 +24,20 @@ fn of_table(
     Ok(vec![Some(build.mul(&derivative, dw))])
 }
 
+/// Linear in the field; the taps come once for each axis, and are constant like the neighbours.
+fn of_bricks(
+    operation: &CustomOpIr,
+    tangents: &[Option<TensorIr>],
+    build: &mut Builder,
+) -> Tangents {
+    if tangents[1..].iter().any(Option::is_some) {
+        return Err(Error::NoRule {
+            operation: format!("{BRICKS} with respect to its taps or neighbours"),
+        });
+    }
+    multilinear(operation, tangents, build)
+}
+
 fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
     let flag = |scalar: &ScalarIr| *scalar == ScalarIr::Bool(true);
     let count = |scalar: &ScalarIr| scalar.elem::<u64>() as usize;
@@ -49,7 +63,7 @@ pub fn extensions() -> Extensions {
     extensions
         .rule(CONVOLUTION, multilinear)
         .rule(CORRELATION, multilinear)
-        .rule(BRICKS, multilinear)
+        .rule(BRICKS, of_bricks)
         .rule(TABULATED, of_table);
     #[cfg(feature = "flex")]
     {
@@ -64,4 +78,27 @@ pub fn extensions() -> Extensions {
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
     register(&mut extensions.cube);
     extensions
+}
+
+#[cfg(test)]
+mod tests {
+    use linearize::Graph;
+
+    use super::*;
+    use crate::{ComputeDevice, brick_convolution};
+
+    #[test]
+    fn taps_of_bricks_are_constant_in_forward_mode_too() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let x = device.tensor::<2>(&[0.5; 64], [8, 8]);
+        let taps = device.tensor::<1>(&[0.25, 0.5, 0.25], [3]);
+        let neighbours = device.tensor::<2>(&[0.0; 4], [1, 4]);
+        let variables = [(&x).into(), (&taps).into()];
+        let graph = Graph::trace(&variables, &[neighbours.into()], |i| {
+            let (x, taps) = (i.variable::<2>(0), i.variable::<1>(1));
+            vec![brick_convolution(x, taps, i.parameter::<2>(0), false).into()]
+        });
+        let refused = graph.unwrap().linearize(&extensions(), None).unwrap_err();
+        assert!(matches!(&refused, Error::NoRule { operation } if operation.contains("taps")));
+    }
 }
