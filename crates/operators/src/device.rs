@@ -114,12 +114,18 @@ impl ComputeDevice {
     /// The same device in another precision (`f32` on a CPU, for comparisons).
     ///
     /// # Errors
-    /// [`Error::Unavailable`] for `f64` on a GPU, which computes wrongly there.
+    /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on a GPU, which computes wrongly there.
     pub fn with_dtype(mut self, dtype: DType) -> Result<Self, Error> {
-        if !self.kind.is_cpu() && dtype != DType::F32 {
+        let reason = match dtype {
+            DType::F32 => None,
+            DType::F64 if self.kind.is_cpu() => None,
+            _ if self.kind.is_cpu() => Some("has no operations there; use f32 or f64"),
+            _ => Some("is not reliable there; use f32"),
+        };
+        if let Some(reason) = reason {
             return Err(Error::Unavailable {
                 name: self.kind.name(),
-                reason: format!("{dtype:?} is not reliable there; use f32"),
+                reason: format!("{dtype:?} {reason}"),
             });
         }
         self.dtype = dtype;
@@ -181,6 +187,22 @@ impl ComputeDevice {
             _ => Err(Error::Read {
                 reason: format!("expected one value, got {}", values.len()),
             }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn precisions_without_operations_are_refused() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        assert!(device.clone().with_dtype(DType::F32).is_ok());
+        for dtype in [DType::F16, DType::BF16, DType::I64] {
+            let error = device.clone().with_dtype(dtype).unwrap_err();
+            assert!(matches!(error, Error::Unavailable { .. }), "{error}");
+            assert!(error.to_string().contains(&format!("{dtype:?}")), "{error}");
         }
     }
 }
