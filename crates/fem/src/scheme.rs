@@ -58,7 +58,7 @@ pub struct Scheme<const D: usize> {
     /// Inverse of the linearized implicit step in the pure phases.
     phase: SpectralFilter,
     systems: Mutex<Vec<(Vec<f64>, Arc<System<D>>)>>,
-    symbolic: Mutex<Option<Symbolic>>,
+    symbolic: Mutex<Option<Arc<Symbolic>>>,
     statistics: Mutex<Statistics>,
     failure: Mutex<Option<Error>>,
 }
@@ -278,15 +278,17 @@ impl<const D: usize> Scheme<D> {
     }
 
     fn factorize(&self, matrix: &Stencil<D>) -> Result<Factorization, Error> {
-        let mut symbolic = lock(&self.symbolic);
-        let symbolic = match &mut *symbolic {
+        // Used without the lock, as in `cached_system`.
+        let known = lock(&self.symbolic).clone();
+        let symbolic = match known {
             Some(symbolic) => symbolic,
-            none => {
+            None => {
                 let places = matrix
                     .lower_entries()
                     .map(|(row, col, _)| Pair { row, col });
                 let places: Vec<Pair<usize, usize>> = places.collect();
-                none.insert(Symbolic::new(matrix.diagonal().len(), &places)?)
+                let symbolic = Arc::new(Symbolic::new(matrix.diagonal().len(), &places)?);
+                lock(&self.symbolic).insert(symbolic).clone()
             }
         };
         lock(&self.statistics).factorizations += 1;
