@@ -1,10 +1,13 @@
 //! The paper's linear algebra: sparse Cholesky factorizations (faer), for all dimensions alike.
 
+use std::sync::LazyLock;
+
 use faer::linalg::solvers::Solve;
 pub(crate) use faer::sparse::Pair;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Side};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::Error;
 
@@ -16,10 +19,18 @@ pub(crate) struct Symbolic {
     order: Argsort,
     cholesky: SymbolicLlt<usize>,
     unknowns: usize,
+    pool: &'static ThreadPool,
 }
 
 /// `L L^T`
-pub(crate) struct Factorization(Llt<usize, f64>);
+pub(crate) struct Factorization {
+    llt: Llt<usize, f64>,
+    pool: &'static ThreadPool,
+}
+
+/// Two threads: the order of sums in factorizations and solutions depends on their number.
+static POOL: LazyLock<Result<ThreadPool, ThreadPoolBuildError>> =
+    LazyLock::new(|| ThreadPoolBuilder::new().num_threads(2).build());
 
 fn failed(unknowns: usize, reason: &impl std::fmt::Debug) -> Error {
     Error::Factorization {
@@ -36,11 +47,13 @@ impl Symbolic {
                 .map_err(|error| failed(unknowns, &error))?;
         let cholesky = SymbolicLlt::try_new(pattern.as_ref(), Side::Lower)
             .map_err(|error| failed(unknowns, &error))?;
+        let pool = POOL.as_ref().map_err(|error| failed(unknowns, error))?;
         Ok(Self {
             pattern,
             order,
             cholesky,
             unknowns,
+            pool,
         })
     }
 
@@ -48,8 +61,10 @@ impl Symbolic {
     pub(crate) fn factorize(&self, entries: &[f64]) -> Result<Factorization, Error> {
         let matrix = SparseColMat::new_from_argsort(self.pattern.clone(), &self.order, entries)
             .map_err(|error| failed(self.unknowns, &error))?;
-        Llt::try_new_with_symbolic(self.cholesky.clone(), matrix.as_ref(), Side::Lower)
-            .map(Factorization)
+        let factorize =
+            || Llt::try_new_with_symbolic(self.cholesky.clone(), matrix.as_ref(), Side::Lower);
+        let (llt, pool) = (self.pool.install(factorize), self.pool);
+        llt.map(|llt| Factorization { llt, pool })
             .map_err(|error| failed(self.unknowns, &error))
     }
 }
@@ -57,7 +72,7 @@ impl Symbolic {
 impl Factorization {
     pub(crate) fn solve(&self, right: &[f64]) -> Vec<f64> {
         let mut x = Mat::from_fn(right.len(), 1, |i, _| right[i]);
-        self.0.solve_in_place(&mut x);
+        self.pool.install(|| self.llt.solve_in_place(&mut x));
         x.col_as_slice(0).to_vec()
     }
 }

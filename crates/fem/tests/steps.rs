@@ -7,6 +7,7 @@ use geometry::exact::mean_curvature_radius;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Torus};
 use geometry::{Field, Grid, phase_field};
+use rayon::prelude::*;
 
 /// Data without an interface: smooth on any grid.
 fn smooth(grid: Grid<2>) -> Field<2> {
@@ -153,6 +154,25 @@ fn conjugate_gradients_and_cholesky_agree() {
         step(LinearSolver::Direct),
     );
     assert!(l2_distance(&a, &b).unwrap() < 1e-11);
+}
+
+#[test]
+fn clones_of_a_direct_step_work_in_parallel_to_the_same_bytes_on_any_number_of_threads() {
+    let grid = Grid::<3>::centred(14, 1.0).unwrap();
+    let ball = phase_field(grid, &Ball::new([0.0; 3], 0.3).unwrap(), 0.15).unwrap();
+    let run = |threads: usize| -> Vec<Vec<f64>> {
+        let direct = LinearSolver::Direct;
+        let step = FiniteElementStep::implicit_with(&grid, 0.15, 0.005, direct).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let steps = (0..4).into_par_iter().map(|_| step.clone().step(&ball));
+            steps.map(|v| v.unwrap().into_values()).collect()
+        })
+    };
+    let alone = run(1);
+    assert!(alone.windows(2).all(|pair| pair[0] == pair[1]));
+    assert_eq!(run(2), alone);
+    assert_eq!(run(5), alone);
 }
 
 /// Ratio of the differences between successively refined results.
