@@ -237,6 +237,17 @@ fn odd_parts_have_the_same_factors_and_no_spontaneous_curvature() {
 }
 
 #[test]
+fn spectra_do_not_depend_on_the_number_of_threads() {
+    let networks = Shipped::Paper.all().unwrap().into_iter();
+    let (_, widest) = networks.max_by_key(|(_, n)| n.ratios().width).unwrap();
+    let spectrum = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| widest.flat_spectrum().unwrap())
+    };
+    assert_eq!(spectrum(1), spectrum(4));
+}
+
+#[test]
 fn files_with_and_without_a_calibration_are_read() {
     let (_, network) = Shipped::Paper.all().unwrap().remove(0);
     let path = std::path::Path::new("network.safetensors");

@@ -128,8 +128,6 @@ pub fn calibrate<S: PlanarStep>(
     normals: &[(&[isize], f64)],
     step: impl Fn(&[isize]) -> S + Sync,
 ) -> Result<Calibration, Error> {
-    // One thread: the order of sums in the factorizations depends on their number.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let work = || -> Result<Vec<(Vec<PlanarInterface>, f64)>, Error> {
         let all = normals.iter().map(|(normal, weight)| {
             let step = step(normal);
@@ -139,10 +137,7 @@ pub fn calibrate<S: PlanarStep>(
         });
         all.collect()
     };
-    let all = match pool {
-        Ok(pool) => pool.install(work),
-        Err(_) => work(),
-    }?;
+    let all = on_one_thread(work)?;
     let total: f64 = all.iter().map(|(_, weight)| weight).sum();
     let mean = |f: fn(&PlanarInterface) -> f64| -> f64 {
         let means =
@@ -168,6 +163,14 @@ pub fn calibrate<S: PlanarStep>(
         position_spread: position_spreads.fold(0.0, f64::max),
         normal_spread: spread(energies),
     })
+}
+
+/// The order of sums in factorizations depends on the number of threads.
+fn on_one_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
 }
 
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {

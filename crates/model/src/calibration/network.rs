@@ -2,7 +2,7 @@
 
 use faer::{Col, Mat};
 
-use super::{POSITIONS, PlanarScales, PlanarStep, calibrate, normals, planar};
+use super::{POSITIONS, PlanarScales, PlanarStep, calibrate, normals, on_one_thread, planar};
 use crate::ratios::offsets;
 use crate::{Calibration, Error, Mlp, Network};
 
@@ -110,7 +110,8 @@ impl Network {
     /// the transfer function's values in the pure phases.
     pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
         let (normal, _) = normals(self.ratios().dimension)[0];
-        planar::spectrum(&NetworkOnPlanes::new(self, normal), POSITIONS[0])
+        let step = NetworkOnPlanes::new(self, normal);
+        on_one_thread(|| planar::spectrum(&step, POSITIONS[0]))
     }
 }
 
