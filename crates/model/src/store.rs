@@ -68,7 +68,8 @@ impl Network {
     /// `checksum` of all of it.
     ///
     /// # Errors
-    /// [`Error::Weights`] if the metadata cannot be encoded, have losses that are not finite, or are longer than a reader accepts.
+    /// [`Error::Weights`] if the metadata cannot be encoded, have losses or a calibration that are not finite, or are longer than a
+    /// reader accepts.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         let failed = |reason: String| Error::Weights {
             path: "network".into(),
@@ -79,6 +80,9 @@ impl Network {
         let losses = [of.training_loss, of.held_out_loss, of.flipped_loss];
         if !losses.iter().all(|loss| loss.is_finite()) {
             return Err(failed(format!("its losses {losses:?} are not finite")));
+        }
+        if let Some(calibration) = self.calibration.filter(|found| !found.is_finite()) {
+            return Err(failed(format!("its {calibration:?} is not finite")));
         }
         let metadata = Metadata {
             format: FORMAT.to_owned(),

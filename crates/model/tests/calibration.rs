@@ -260,3 +260,11 @@ fn files_with_and_without_a_calibration_are_read() {
         assert_eq!(read, network);
     }
 }
+
+#[test]
+fn calibrations_that_are_not_finite_are_not_written() {
+    let (_, mut network) = Shipped::Paper.all().unwrap().remove(0);
+    network.calibration.as_mut().unwrap().alignment = f64::NAN;
+    let error = network.to_bytes().unwrap_err();
+    assert!(matches!(error, Error::Weights { .. }), "{error}");
+}

@@ -97,6 +97,16 @@ impl Calibration {
         let Factors { energy, metric } = self.factors;
         (energy / (self.alignment * metric)).sqrt()
     }
+
+    /// Whether all of its numbers are, as those in files must be.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Factors { energy, metric } = self.factors;
+        let lengths = [self.spontaneous_curvature, self.displacement];
+        let quality = [self.alignment, self.eigenvalue];
+        let spreads = [self.position_spread, self.normal_spread];
+        let all = [[energy, metric], lengths, quality, spreads];
+        all.as_flattened().iter().all(|number| number.is_finite())
+    }
 }
 
 /// Normals and their weights: `c` is averaged over them. In 2D the four integrate `cos 4 theta` exactly, in 3D they are Lebedev's

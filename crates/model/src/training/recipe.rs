@@ -42,7 +42,7 @@ pub struct Training<'a, R> {
     pub data: SphereData,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Number of held-out radii on which the quality is measured.
+    /// Number of held-out radii on which the quality is measured, at least 1.
     pub held_out: usize,
 }
 
@@ -99,7 +99,7 @@ impl<R: Recipe> Training<'_, R> {
     /// Trains on from a checkpoint, keeps it up to date, and measures the result.
     ///
     /// # Errors
-    /// [`Error::Training`] without double precision or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
+    /// [`Error::Training`] without double precision, or held-out radii or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
     pub fn run(
         &self,
         checkpoint: &mut Checkpoint<R::State>,
@@ -160,6 +160,12 @@ impl<R: Recipe> Training<'_, R> {
                 device.kind().name()
             )));
         }
+        if self.held_out == 0 {
+            return Err(Error::Training(
+                "0 held-out radii have no loss to save with the network: choose 1 or more"
+                    .to_owned(),
+            ));
+        }
         let nodes = (self.data.cells as f64).powi(self.data.ratios.dimension as i32);
         let gigabytes = 1e-9 * 8.0 * VECTORS * nodes;
         match memory::available().map(|bytes| 1e-9 * bytes) {
@@ -178,14 +184,28 @@ mod tests {
     use super::*;
     use crate::Ratios;
     use crate::training::levenberg_marquardt::{LmParams, LmState};
+    use crate::training::tests::ratios;
+
+    #[test]
+    fn a_training_without_held_out_radii_is_refused_before_it() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let training = Training {
+            recipe: &LmParams::new(true),
+            data: SphereData::new(ratios(2, 17), 128).unwrap(),
+            seed: 1,
+            held_out: 0,
+        };
+        let found = training.run(&mut Checkpoint::default(), &device, &mut |_, _| Ok(false));
+        assert!(matches!(found, Err(Error::Training(reason)) if reason.contains("held-out")));
+    }
 
     #[test]
     fn an_interrupted_training_goes_on_from_its_stored_checkpoint() {
         let device = ComputeDevice::default_compiled().unwrap();
-        let ratios = Ratios::of_run(2, 9, 1.0, 1.0, 0.25);
+        let small = Ratios::of_run(2, 9, 1.0, 1.0, 0.25);
         let training = Training {
             recipe: &LmParams::new(true),
-            data: SphereData::new(ratios, 64).unwrap().quick(),
+            data: SphereData::new(small, 64).unwrap().quick(),
             seed: 1,
             held_out: 2,
         };
