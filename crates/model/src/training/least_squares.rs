@@ -338,6 +338,8 @@ impl LeastSquaresParams {
 impl Recipe for LeastSquaresParams {
     type State = ();
 
+    const GOES_ON: bool = false;
+
     /// The heat kernel, [`fit`], and a perceptron of the paper's layers, made odd (so that its hidden layers are twice as wide).
     fn train(
         &self,

@@ -15,6 +15,9 @@ pub trait Recipe: Serialize + Sync {
     /// What the training needs to go on with the same bytes after an interruption; `()` for one that starts over.
     type State: Clone + Send + Serialize + DeserializeOwned;
 
+    /// Whether the training goes on from a state; one that starts over gets none, and a new learning curve.
+    const GOES_ON: bool = true;
+
     /// Trains kernel and activation. The observer is called after every iteration and may stop the training.
     ///
     /// # Errors
@@ -107,7 +110,7 @@ impl<R: Recipe> Training<'_, R> {
         observer: &mut Observer<'_, Checkpoint<R::State>>,
     ) -> Result<Trained, Error> {
         self.check(device)?;
-        let state = checkpoint.state.clone();
+        let state = checkpoint.state.clone().filter(|_| R::GOES_ON);
         if state.is_none() {
             checkpoint.curve.clear();
         }
@@ -183,6 +186,7 @@ impl<R: Recipe> Training<'_, R> {
 mod tests {
     use super::*;
     use crate::Ratios;
+    use crate::training::least_squares::LeastSquaresParams;
     use crate::training::levenberg_marquardt::{LmParams, LmState};
     use crate::training::tests::ratios;
 
@@ -197,6 +201,25 @@ mod tests {
         };
         let found = training.run(&mut Checkpoint::default(), &device, &mut |_, _| Ok(false));
         assert!(matches!(found, Err(Error::Training(reason)) if reason.contains("held-out")));
+    }
+
+    #[test]
+    fn a_training_that_starts_over_has_a_new_curve() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        let training = Training {
+            recipe: &LeastSquaresParams::new(true),
+            data: SphereData::new(ratios(2, 17), 128).unwrap(),
+            seed: 1,
+            held_out: 2,
+        };
+        let mut checkpoint = Checkpoint::default();
+        for _ in 0..2 {
+            let stopped = training.run(&mut checkpoint, &device, &mut |p: &Progress, _: &_| {
+                Ok(p.iteration < 2)
+            });
+            assert!(matches!(stopped, Err(Error::Interrupted { iteration: 2 })));
+            assert_eq!(checkpoint.curve.len(), 2);
+        }
     }
 
     #[test]
