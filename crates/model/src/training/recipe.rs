@@ -102,7 +102,7 @@ impl<R: Recipe> Training<'_, R> {
     /// Trains on from a checkpoint, keeps it up to date, and measures the result.
     ///
     /// # Errors
-    /// [`Error::Training`] without double precision, or held-out radii or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
+    /// [`Error::Training`] without held-out radii, double precision or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
     pub fn run(
         &self,
         checkpoint: &mut Checkpoint<R::State>,
@@ -199,7 +199,11 @@ mod tests {
             seed: 1,
             held_out: 0,
         };
-        let found = training.run(&mut Checkpoint::default(), &device, &mut |_, _| Ok(false));
+        let found = training.run(
+            &mut Checkpoint::default(),
+            &device,
+            &mut |_: &Progress, _: &_| Ok(false),
+        );
         assert!(matches!(found, Err(Error::Training(reason)) if reason.contains("held-out")));
     }
 
