@@ -39,7 +39,7 @@ impl ByHand {
     fn new(network: &Network, shape: &[usize], u: &[f64]) -> Result<Self> {
         let plan = Transform::of_shape(shape);
         let symbol = kernel_symbol(shape, network.kernel(), network.ratios().width);
-        let table = network.activation().table()?;
+        let table = network.table()?;
         let w = plan.filter(u, &symbol, false);
         let [value, slope, mut bend] = [0, 1, 2].map(|order| table.derivatives(&w, order));
         for ((bend, value), u) in bend.iter_mut().zip(value).zip(u) {

@@ -405,7 +405,7 @@ impl<const D: usize> Case<D> {
 
     /// Energy, gradient and Hessian times `p`, from their formulas on the host.
     fn by_hand(&self) -> (f64, Vec<f64>, Vec<f64>) {
-        let table = self.network.activation().table().unwrap();
+        let table = self.network.table().unwrap();
         let shape = [self.cells; D];
         let convolve =
             |x: &[f64], adjoint| convolution(x, &shape, self.network.kernel(), WIDTH, adjoint);
@@ -436,7 +436,7 @@ impl<const D: usize> Case<D> {
     /// The same energy with dual numbers.
     fn dual_energy(&self, backend: &Backend, u: Dual<D>) -> Dual<1> {
         let device = &backend.device;
-        let table = self.network.activation().table().unwrap();
+        let table = self.network.table().unwrap();
         let range = table.range();
         let coefficients = device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]);
         let coefficients = coefficients.autodiff();

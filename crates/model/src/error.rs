@@ -28,6 +28,11 @@ pub enum Error {
     )]
     KernelTooWide { width: usize, cells: usize },
     #[error(
+        "the sizes of the kernel's values add up to {sum:.1}, and may to {most:.1}, since the activation is tabulated up to there: divide the \
+         kernel by {sum:.1} and multiply the first weights of the activation by it, or train the network again"
+    )]
+    KernelTooLarge { sum: f64, most: f64 },
+    #[error(
         "the kernel of this network differs by {error:.0e} of its largest value from a product of functions of one variable, which active \
          bricks need; take a network of the accurate recipe, or store the whole grid"
     )]

@@ -12,7 +12,7 @@ use crate::Error;
 /// Layer widths of the paper: `F: R -> R` through 32, 16, 8, 4, 2 neurons.
 pub const PAPER_LAYERS: [usize; 7] = [1, 32, 16, 8, 4, 2, 1];
 
-/// Where `F` is tabulated for the solver: `K*u` stays within about `[-1, 1]`.
+/// Where `F` is tabulated for the solver where `K*u` stays within about `[-1, 1]`, see [`crate::Network::table`].
 pub const TABLE: TableRange = TableRange {
     low: -2.0,
     high: 2.0,
@@ -166,12 +166,17 @@ impl Mlp {
         Self { layers, parameters }
     }
 
-    /// The quintic Hermite table on [`TABLE`] that the solver uses as `F`.
+    /// The quintic Hermite table on [`TABLE`].
     ///
     /// # Errors
     /// [`Error::Operators`] if `F` overflows on the interval.
     pub fn table(&self) -> Result<HermiteTable, Error> {
-        Ok(HermiteTable::new(TABLE, |w| {
+        self.table_on(TABLE)
+    }
+
+    /// The quintic Hermite table on another interval.
+    pub(crate) fn table_on(&self, range: TableRange) -> Result<HermiteTable, Error> {
+        Ok(HermiteTable::new(range, |w| {
             let [f, f1, f2, _] = self.jet(w);
             [f, f1, f2]
         })?)

@@ -1,9 +1,10 @@
 //! A trained operator: kernel, activation, and the ratios it was trained for.
 
 use files::{Sha256, hexadecimal};
+use operators::{HermiteTable, TableRange};
 use serde::{Deserialize, Serialize};
 
-use crate::{Calibration, Error, Mlp, Ratios};
+use crate::{Calibration, Error, Mlp, Ratios, TABLE};
 
 impl Ratios {
     /// Checks that the numbers can describe an operator.
@@ -108,6 +109,38 @@ impl Network {
     /// Activation `F`.
     pub fn activation(&self) -> &Mlp {
         &self.activation
+    }
+
+    /// What the kernel makes of a constant 1, the sum of its values; 1 if it is that up to what training leaves.
+    pub(crate) fn mass(&self) -> f64 {
+        const ROUNDED: f64 = 1e-3;
+        let mass: f64 = self.kernel.iter().sum();
+        if (mass - 1.0).abs() <= ROUNDED {
+            1.0
+        } else {
+            mass
+        }
+    }
+
+    /// The table that solvers use as `F`, on the smallest whole multiple of [`TABLE`] that holds `K*u` for all `u` within
+    /// `[-1.2, 1.2]`, with cells of the same width.
+    ///
+    /// # Errors
+    /// [`Error::KernelTooLarge`]; [`Error::Operators`] if `F` overflows on the interval.
+    pub fn table(&self) -> Result<HermiteTable, Error> {
+        const REACH: f64 = 1.2;
+        const MOST: f64 = 64.0;
+        let sum: f64 = self.kernel.iter().map(|value| value.abs()).sum();
+        let times = (REACH * sum / TABLE.high).ceil().max(1.0);
+        if times > MOST {
+            let most = MOST * TABLE.high / REACH;
+            return Err(Error::KernelTooLarge { sum, most });
+        }
+        self.activation.table_on(TableRange {
+            low: times * TABLE.low,
+            high: times * TABLE.high,
+            cells: times as usize * TABLE.cells,
+        })
     }
 
     /// SHA-256 of the numbers, in hexadecimal: networks with the same fingerprint are the same operator.

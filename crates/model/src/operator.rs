@@ -24,18 +24,18 @@ impl<const D: usize> MeanCurvatureOperator<D> {
     /// Uploads a network.
     ///
     /// # Errors
-    /// [`Error::Shape`] if the network is of another dimension; as [`crate::Mlp::table`].
+    /// [`Error::Shape`] if the network is of another dimension; as [`Network::table`].
     pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
         let ratios = network.ratios_in(D)?;
-        let table = network.activation().table()?;
-        let range = table.range();
+        let table = network.table()?;
+        let (range, mass) = (table.range(), network.mass());
         Ok(Self {
             kernel: device.tensor(network.kernel(), [ratios.width; D]),
             table: device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]),
             range,
             host_kernel: network.kernel().to_vec(),
             width: ratios.width,
-            slope: 0.5 * (table.derivative(1.0, 1) + table.derivative(-1.0, 1)),
+            slope: 0.5 * (table.derivative(mass, 1) + table.derivative(-mass, 1)),
         })
     }
 
@@ -48,8 +48,8 @@ impl<const D: usize> MeanCurvatureOperator<D> {
         tabulated(smoothed, table, self.range, 0)
     }
 
-    /// The inverse of the energy's Hessian in the pure phases, `1 / (1 + c |1 - F'(1) k|^2)` with `k` the kernel's
-    /// transfer function and `c = tau / tautilde^2`: the preconditioner of a minimizing-movement step.
+    /// The inverse of the energy's Hessian in the pure phases, `1 / (1 + c |1 - F'(m) k|^2)` with `k` the kernel's
+    /// transfer function, `m` its value for constants and `c = tau / tautilde^2`: the preconditioner of a minimizing-movement step.
     pub fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> SpectralFilter {
         let slope = self.slope;
         SpectralFilter::from_kernel(&[cells; D], &self.host_kernel, self.width, |k| {

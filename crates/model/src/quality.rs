@@ -42,7 +42,7 @@ pub struct Quality {
     pub transfer_max: f64,
     /// Largest imaginary part of the transfer function: zero for a symmetric kernel.
     pub transfer_imaginary: f64,
-    /// `max |F(+-1) -+ 1|`.
+    /// `max |F(+-m) -+ 1|`, `m` being what the kernel makes of 1: up to a thousandth 1 itself, unless the kernel is scaled.
     pub phase_defect: f64,
     /// `max |F'' (w + s) - F''(w)| / max |F''|` on a line finer than any training sample: a spike would show.
     pub activation_roughness: f64,
@@ -74,7 +74,7 @@ impl Quality {
         let points = Transform::<f64>::of_shape(&shape).len() as f64;
         let symbol = kernel_symbol(&shape, network.kernel(), network.ratios().width);
         let transfer = || symbol.iter().map(|k| k.re * points);
-        let activation = network.activation();
+        let (activation, mass) = (network.activation(), network.mass());
         Ok(Self {
             held_out_loss,
             flipped_loss,
@@ -84,7 +84,7 @@ impl Quality {
             transfer_min: transfer().fold(f64::INFINITY, f64::min),
             transfer_max: transfer().fold(f64::NEG_INFINITY, f64::max),
             transfer_imaginary: largest(symbol.iter().map(|k| k.im * points)),
-            phase_defect: largest([-1.0, 1.0].iter().map(|w| activation.value(*w) - w)),
+            phase_defect: largest([-1.0, 1.0].iter().map(|u| activation.value(mass * u) - u)),
             activation_roughness: roughness(network),
             radial_asymmetry: radial_asymmetry(network),
         })
@@ -174,12 +174,13 @@ fn applied(
     }))
 }
 
-/// Fine line over the arguments that occur, `[-1.05, 1.05]`.
+/// Fine line over the arguments that occur, `[-1.05, 1.05]` times what the kernel makes of 1.
 fn roughness(network: &Network) -> f64 {
     const POINTS: usize = 20_001;
+    let mass = network.mass();
     let bends: Vec<f64> = (0..POINTS)
         .map(|i| -1.05 + 2.1 * i as f64 / (POINTS - 1) as f64)
-        .map(|w| network.activation().jet(w)[2])
+        .map(|w| network.activation().jet(mass * w)[2])
         .collect();
     let jump = largest(bends.windows(2).map(|w| w[1] - w[0]));
     jump / largest(bends.into_iter()).max(f64::MIN_POSITIVE)
@@ -206,30 +207,61 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Shipped;
+    use crate::{MeanCurvatureOperator, Shipped};
 
-    /// The same function with `w` forty times as large: beyond the table, but not worse.
+    /// The same operator with another scale of `w`.
+    fn scaled(network: &Network, scale: f64) -> Network {
+        let kernel = network.kernel().iter().map(|k| scale * k).collect();
+        let mut parameters = network.activation().parameters().to_vec();
+        // The weights of the first layer come first.
+        for weight in &mut parameters[..network.activation().layers()[1]] {
+            *weight /= scale;
+        }
+        let activation =
+            crate::Mlp::new(network.activation().layers().to_vec(), parameters).unwrap();
+        let provenance = network.provenance.clone();
+        Network::new(network.ratios(), kernel, activation, provenance).unwrap()
+    }
+
+    /// With `w` forty times as large: beyond the table, but not worse.
     #[test]
     fn losses_hold_beyond_the_table_of_the_activation() {
-        const SCALE: f64 = 40.0;
         let (_, network) = Shipped::Paper.all().unwrap().remove(0);
         let device = ComputeDevice::default_compiled().unwrap();
         let mut data =
             SphereData::new(network.ratios(), network.provenance.reference_cells).unwrap();
         data.count = 4;
         let quality = |network: &Network| Quality::measure(network, &data, 2, &device).unwrap();
-        let kernel = network.kernel().iter().map(|k| SCALE * k).collect();
-        let mut parameters = network.activation().parameters().to_vec();
-        // The weights of the first layer come first.
-        for weight in &mut parameters[..network.activation().layers()[1]] {
-            *weight /= SCALE;
-        }
-        let activation =
-            crate::Mlp::new(network.activation().layers().to_vec(), parameters).unwrap();
-        let provenance = network.provenance.clone();
-        let scaled = Network::new(network.ratios(), kernel, activation, provenance).unwrap();
-        let (expected, found) = (quality(&network), quality(&scaled));
+        let (expected, found) = (quality(&network), quality(&scaled(&network, 40.0)));
         let ratio = found.held_out_loss / expected.held_out_loss;
         assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+        let difference = found.phase_defect - expected.phase_defect;
+        assert!(difference.abs() < 1e-5, "{difference:e}");
+    }
+
+    #[test]
+    fn operators_do_not_depend_on_the_scale_of_the_kernel_unless_it_is_refused() {
+        let ratios = crate::Ratios {
+            dimension: 2,
+            width: 17,
+            eps_over_h: 2.0,
+            step_over_h2: 1.0,
+        };
+        let network = Shipped::Paper.find(ratios).unwrap();
+        let device = ComputeDevice::default_compiled().unwrap();
+        let u: Vec<f64> = (0..1024).map(|i| (0.37 * f64::from(i)).sin()).collect();
+        let results = |network: &Network| {
+            let operator = MeanCurvatureOperator::<2>::new(network, &device).unwrap();
+            let applied = operator.apply(device.tensor(&u, [32, 32]));
+            let filter = operator.phase_preconditioner(32, 10.0);
+            [device.values(applied).unwrap(), filter.apply(&u)]
+        };
+        let (expected, found) = (results(&network), results(&scaled(&network, 40.0)));
+        for (k, limit) in [1e-9, 1e-4].into_iter().enumerate() {
+            let difference = largest(expected[k].iter().zip(&found[k]).map(|(a, b)| a - b));
+            assert!(difference < limit, "{k}: {difference:e}");
+        }
+        let refused = scaled(&network, 200.0).table();
+        assert!(matches!(refused, Err(Error::KernelTooLarge { .. })));
     }
 }

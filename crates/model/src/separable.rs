@@ -35,7 +35,7 @@ impl<const D: usize> SeparableOperator<D> {
     pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
         let ratios = network.ratios_in(D)?;
         let taps = factor::<D>(network.kernel(), ratios.width)?;
-        let table = network.activation().table()?;
+        let table = network.table()?;
         let mass = taps.iter().sum::<f64>().powi(D as i32);
         let [negative, positive] = [-1.0, 1.0].map(|phase| rest(&table, mass, phase));
         let rests = [negative?, positive?];
