@@ -102,7 +102,8 @@ impl<R: Recipe> Training<'_, R> {
     /// Trains on from a checkpoint, keeps it up to date, and measures the result.
     ///
     /// # Errors
-    /// [`Error::Training`] without held-out radii, double precision or the memory to measure the result; those of the recipe; [`Error::Interrupted`].
+    /// [`Error::Training`] without held-out radii, double precision or the memory to measure the result; those of the recipe;
+    /// [`Error::Interrupted`].
     pub fn run(
         &self,
         checkpoint: &mut Checkpoint<R::State>,
