@@ -104,10 +104,14 @@ pub fn program(options: &Options) -> Result<()> {
 /// The shapes over time, D outlined in green.
 fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let (trajectory, tau) = (one.trajectory, one.tau());
+    let power = |size: f64| format!("2{}", report::superscript(size.log2().round() as i32));
     let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.field()?)];
     for &k in INSIDE {
         if let Some(field) = trajectory.part_field(k)? {
-            shown.push((format!("2^-{k} of a step"), field));
+            shown.push((
+                format!("{} of a step", power(0.5_f64.powi(k as i32))),
+                field,
+            ));
         }
     }
     for &(k, _) in one.distances.iter().filter(|(k, _)| *k > 0) {
@@ -132,8 +136,8 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     });
     let title = format!("Inpainting: {}", one.shape.title);
     Ok(Figure::new(title, 4).with_panels(panels).with_note(format!(
-        "n = {n}, τ = 2^{}; only the values inside the green frame move. The first step is made in {} parts.{end}",
-        tau.log2(),
+        "n = {n}, τ = {}; only the values inside the green frame move. The first step is made in {} parts.{end}",
+        power(tau),
         trajectory.substeps(1).len(),
     )))
 }
