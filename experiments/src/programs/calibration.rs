@@ -257,6 +257,7 @@ fn discs_figure(discs: &[DiscRow]) -> Figure {
     Figure::new("Willmore energy of discs, w R/π", 2)
         .with_panels(discs.chunk_by(same).map(panel))
         .with_shared_legend()
+        .with_note("Of operators that treat both phases alike only the complements are seen, which cover the discs.")
 }
 
 /// The Willmore energy that the scheme sees in a surface whose energy is known.
