@@ -79,7 +79,7 @@ pub fn energy_increases(records: &[Record]) -> usize {
     minimizations(records).filter(risen).count()
 }
 
-/// By how much the sum of estimates is multiplied, for the errors that have none: with it no estimate of `work_precision` is below a third of the truth.
+/// By how much the sum of estimates is multiplied, for the errors that have none: with it the estimates for curves in `work_precision` are at least a third of the truth, or nearly.
 pub(crate) const ESTIMATES_MISS: f64 = 1.35;
 
 /// The estimated time error of second-order steps at the end of the last of them, largest over the interface; none before the first
