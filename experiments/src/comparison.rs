@@ -1,7 +1,6 @@
 //! A shape by all methods and resolutions, against a finer run as in the paper, and against the exact flow.
 
 use geometry::measure::perimeter;
-use report::superscript;
 
 use crate::prelude::*;
 use crate::truth::{self, CELLS, Reached, Sample, Truth};
@@ -432,7 +431,7 @@ fn time_label(step: usize) -> String {
         return "0".to_owned();
     }
     let power = step.trailing_zeros();
-    let unit = format!("2{}", superscript(power as i32 - 14));
+    let unit = study::power_of_two(time(1 << power));
     match step >> power {
         1 => unit,
         factor => format!("{factor}·{unit}"),

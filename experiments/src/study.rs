@@ -204,6 +204,11 @@ pub fn colour(method: Method, scheme: Scheme) -> usize {
     }
 }
 
+/// A power of two as figures write it, such as `2⁻¹⁴`.
+pub fn power_of_two(value: f64) -> String {
+    format!("2{}", report::superscript(value.log2().round() as i32))
+}
+
 /// The zero level of a phase field.
 pub fn zero_level_curve(field: &Field<2>) -> Curve {
     let curves = zero_level(field).into_iter();

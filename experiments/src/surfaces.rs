@@ -187,7 +187,7 @@ pub fn energy_by_elements(
     Ok(Some(case.implicit_elements()?.willmore_energy(&u()?)?))
 }
 
-/// How that is measured on a grid, or what is shown in its place.
+/// How notes of figures say that `w` was measured on this grid: [by elements](energy_by_elements), or by the scheme where there are too many nodes.
 pub fn measured(grid: &Grid<3>) -> &'static str {
     if grid.len() > MOST_NODES {
         "as the scheme measures it"
@@ -299,11 +299,11 @@ pub fn raster(picture: &Picture, caption: impl Into<String>) -> Raster {
 
 /// Sizes of time steps that are powers of two, for figures.
 fn in_words(steps: StepRule) -> String {
-    let power = |tau: f64| format!("2{}", report::superscript(tau.log2().round() as i32));
     match steps {
-        StepRule::Constant(tau) => format!("τ = {}", power(tau)),
+        StepRule::Constant(tau) => format!("τ = {}", study::power_of_two(tau)),
         StepRule::Doubling(first) => {
-            format!("first step τ = {}, doubled after every step", power(first))
+            let first = study::power_of_two(first);
+            format!("first step τ = {first}, doubled after every step")
         }
         other => format!("τ = {other}"),
     }

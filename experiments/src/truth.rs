@@ -13,7 +13,7 @@ use crate::prelude::*;
 pub struct Sample<const D: usize> {
     pub key: &'static str,
     pub title: &'static str,
-    /// Side of the periodic box. The profile's tails are below 1e-12 at the boundary.
+    /// Side of the periodic box, which is at least six interface widths from the shape in the experiments.
     pub side: f64,
     pub initial: fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error>,
     /// The curve, or the profile of the surface.
@@ -245,7 +245,7 @@ pub struct Truth {
     /// The curve, or the profile of the surface.
     pub outline: Curve,
     /// Of a curve the extent from the origin along the x axis and along the diagonal, the enclosed area, the length, and
-    /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int h^2`.
+    /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int H^2`.
     pub sizes: Numbers,
 }
 

@@ -382,8 +382,8 @@ pub struct FairOptions {
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub keep: Option<String>,
 
-    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved. A segmentation always gives a new mesh;
-    /// with --repair it may be that of a mesh that is not closed
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved; with --repair the input need not be
+    /// closed. A segmentation always gives a new mesh
     #[arg(long)]
     pub remesh: bool,
 
@@ -407,8 +407,9 @@ pub struct InpaintOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// The region that is filled: an image of the size of the input, or a square for the box of another input (its opaque pixels if some are not, else the dark ones, or the light ones if
-    /// most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
+    /// The region that is filled: an image of the size of the input, or a square for the box of another input (its opaque pixels if some
+    /// are not, else the dark ones, or the light ones if most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D
+    /// box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub mask: Option<String>,
 

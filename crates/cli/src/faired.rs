@@ -16,10 +16,8 @@ const LOST: Rgb = OKABE_ITO[1];
 
 /// What became of a surface.
 pub struct Faired {
-    /// The extension of files that keep everything.
-    pub extension: String,
-    /// With everything that the input had, unless the mesh is new.
-    pub file: Option<Vec<u8>>,
+    /// The extension and the bytes of a file with everything that the input had, unless the mesh is new.
+    pub file: Option<(String, Vec<u8>)>,
     pub mesh: TriangleMesh,
     pub displacement: Figure,
     pub report: Value,
@@ -27,18 +25,12 @@ pub struct Faired {
 
 impl Faired {
     /// A new mesh in place of a surface.
-    pub fn anew(
-        before: &ClosedMesh,
-        mesh: TriangleMesh,
-        extension: String,
-        up: UpAxis,
-    ) -> Result<Self> {
+    pub fn anew(before: &ClosedMesh, mesh: TriangleMesh, up: UpAxis) -> Result<Self> {
         let distance = MeshDistance::new(before);
         let lengths = distance.signed_distances(&mesh.vertices).into_iter();
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
         let none_lost = vec![false; lengths.len()];
         Ok(Self {
-            extension,
             file: None,
             displacement: figure(&mesh, &lengths, &none_lost, up)?,
             report: report(before, &mesh, &lengths),
@@ -48,9 +40,9 @@ impl Faired {
 
     /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let same = extension(path) == self.extension;
-        if let Some(file) = self.file.as_ref().filter(|_| same) {
-            let written = files::write_atomically(path, |out| out.write_all(file));
+        let same = |(format, _): &&(String, _)| extension(path) == *format;
+        if let Some((_, bytes)) = self.file.as_ref().filter(same) {
+            let written = files::write_atomically(path, |out| out.write_all(bytes));
             return Ok(written.map_err(geometry::Error::from)?);
         }
         Ok(surfaces::write(path, &self.mesh)?)

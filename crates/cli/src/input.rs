@@ -364,6 +364,11 @@ impl<'a> Reader<'a> {
         THIN * self.eps_over_h * grid.spacing()
     }
 
+    /// What else allows losses, for advice.
+    fn or_allow_loss(&self) -> &'static str {
+        self.allows_loss.map_or("", |_| " or --allow-loss")
+    }
+
     /// Says that so much of the boundary is thin, if it is much, or refuses to lose even more unless the grid was chosen or losses are allowed.
     fn tell_thin<const D: usize>(
         &self,
@@ -382,7 +387,7 @@ impl<'a> Reader<'a> {
             self.cells(),
         );
         if refuses && self.allows_loss != Some(true) && part >= MOST_LOST {
-            let or = self.allows_loss.map_or("", |_| " or --allow-loss");
+            let or = self.or_allow_loss();
             refuse!("{message}: give a larger --side-length, or --cells{or} to go on all the same");
         }
         self.messages.warn(&message);
@@ -398,9 +403,12 @@ impl<'a> Reader<'a> {
         let coarsest = std::mem::replace(&mut self.options.cells, chosen);
         let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
         let grids: Vec<usize> = grids.filter(|&cells| Some(cells) >= coarsest).collect();
-        let advice =
-            "give a larger --side-length or more --cells, or these --cells to go on without them";
-        let refused = (chosen.is_none() && self.allows_loss != Some(true)).then_some(advice);
+        let advice = format!(
+            "give a larger --side-length or more --cells, or these --cells{} to go on without them",
+            self.or_allow_loss()
+        );
+        let refused = chosen.is_none() && self.allows_loss != Some(true);
+        let refused = refused.then_some(&*advice);
         let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
         let space = Space {
             up,

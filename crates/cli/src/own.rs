@@ -187,7 +187,7 @@ impl OwnMesh {
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
     pub fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64, up: UpAxis) -> Result<Faired> {
-        let (rough, extension) = (self.rough(), self.extension().to_owned());
+        let rough = self.rough();
         if self.is_new {
             let mut mesh = surface(u, eps)?;
             // That of the zero level set, but for what noise does not change.
@@ -199,7 +199,7 @@ impl OwnMesh {
                 };
                 mesh = mesh.with_volume(rough.volume(), moves);
             }
-            let mut made = Faired::anew(rough, mesh, extension, up)?;
+            let mut made = Faired::anew(rough, mesh, up)?;
             made.report["noise"] = self.noise.into();
             return Ok(made);
         }
@@ -227,8 +227,10 @@ impl OwnMesh {
         report["noise"] = self.noise.into();
         report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
         Ok(Faired {
-            extension,
-            file: Some(surfaces::rewrite(bytes, &self.file, &all)?),
+            file: Some((
+                self.extension().to_owned(),
+                surfaces::rewrite(bytes, &self.file, &all)?,
+            )),
             displacement: figure(&moved, &lengths, &lost, up)?,
             mesh: all,
             report,

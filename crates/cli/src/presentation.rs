@@ -79,10 +79,10 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
 
     /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];
-    /// and that of those in the folder of a run,
+    /// and that of the shape in the folder of a run,
     const USUAL: &'static str;
 
-    /// where what it is at the end may have another one.
+    /// but for what became of a surface at its end, which has this one.
     fn extension(&self) -> &str {
         Self::USUAL
     }
@@ -127,7 +127,7 @@ pub fn is_of_end(name: &str, shape: &str) -> bool {
 
 /// Whether a file in the folder of a run is one that it writes besides those that it begins with. Its shapes have these extensions, before the
 /// end and there.
-pub fn is_written(path: &Path, [shape, last]: [&str; 2]) -> bool {
+pub fn is_written(path: &Path, [shape, last]: &[String; 2]) -> bool {
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or_default();
     let stem = name.split('.').next().unwrap_or_default();
     if path.parent() == Some(Path::new(FRAMES)) {

@@ -223,7 +223,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         stem: &str,
         run: &mut RunDirectory,
     ) -> Result<()> {
-        let usual = faired.map_or(O::USUAL, |faired| &faired.extension);
+        let usual = faired.map_or(O::USUAL, |_| self.presentation.extension());
         let name = format!("{stem}.{}", self.format.as_deref().unwrap_or(usual));
         self.save(u, eps, faired, &run.path().join(&name))?;
         Ok(run.adopt_file(&name)?)
@@ -346,10 +346,7 @@ fn foreign(stored: &StoredRun) -> Option<PathBuf> {
     });
     let is_own = |path: &Path| {
         let name = path.strip_prefix(stored.path());
-        path.is_file()
-            && name.is_ok_and(|name| {
-                presentation::is_written(name, extensions.each_ref().map(String::as_str))
-            })
+        path.is_file() && name.is_ok_and(|name| presentation::is_written(name, &extensions))
     };
     left.filter(|path| path.exists()).find(|path| !is_own(path))
 }
@@ -365,15 +362,18 @@ pub fn free_folder(name: &str) -> PathBuf {
 
 /// Whether a step was made shorter than its rule wanted it. Controlled steps have no such size: they are made again until they are accurate enough.
 fn is_shortened(record: &Record) -> bool {
-    let controlled = record.minimization.and_then(|made| made.estimates);
-    record.halvings > 0 && controlled.is_none()
+    record.halvings > 0 && estimates(record).is_none()
+}
+
+/// What a controlled step says of itself.
+fn estimates(record: &Record) -> Option<StepEstimates> {
+    record.minimization?.estimates
 }
 
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
 /// and the longest displacement of a stage in interface widths.
 fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
-    let made = |record: &Record| record.minimization?.estimates;
-    let estimates: Vec<StepEstimates> = records.iter().filter_map(made).collect();
+    let estimates: Vec<StepEstimates> = records.iter().filter_map(estimates).collect();
     if estimates.is_empty() {
         return None;
     }

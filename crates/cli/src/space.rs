@@ -80,8 +80,7 @@ impl Presentation<3> for Space {
         // Sheets that touch each other are no surface from which another one could be far.
         match ClosedMesh::new(surfaces::phase_field_surface(start, eps)?) {
             Ok((before, _)) if before.volume() > 0.0 => {
-                let extension = Self::USUAL.to_owned();
-                Faired::anew(&before, surface(u, eps)?, extension, self.up).map(Some)
+                Faired::anew(&before, surface(u, eps)?, self.up).map(Some)
             }
             _ => Ok(None),
         }

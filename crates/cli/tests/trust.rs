@@ -11,6 +11,17 @@ use render::{Picture, Rgb};
 
 use crate::common::{outcome, program, run, text};
 
+/// A quick run in the folder that follows.
+const DISC: [&str; 7] = [
+    "flow",
+    "builtin:disc",
+    "--cells",
+    "16",
+    "--steps",
+    "1",
+    "--output",
+];
+
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = run(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -95,26 +106,17 @@ fn nothing_is_written_over_what_is_there() {
         }
     }
     // A run gives way to another one on demand only, and what is no run never does.
-    let flow = [
-        "flow",
-        "builtin:disc",
-        "--cells",
-        "16",
-        "--steps",
-        "1",
-        "--output",
-    ];
-    outcome(folder.path(), &[&flow[..], &["run"]].concat());
+    outcome(folder.path(), &[&DISC[..], &["run"]].concat());
     assert!(
-        refused(folder.path(), &[&flow[..], &["run"]].concat())
+        refused(folder.path(), &[&DISC[..], &["run"]].concat())
             .contains("cannot start a run in run")
     );
-    outcome(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+    outcome(folder.path(), &[&DISC[..], &["run", "--force"]].concat());
     // Also in the folder that the program works in, which cannot be removed itself.
-    outcome(&at("run"), &[&flow[..], &[".", "--force"]].concat());
+    outcome(&at("run"), &[&DISC[..], &[".", "--force"]].concat());
     fs::create_dir(at("own")).unwrap();
     fs::write(at("own/thesis.txt"), "years").unwrap();
-    let line = refused(folder.path(), &[&flow[..], &["own", "--force"]].concat());
+    let line = refused(folder.path(), &[&DISC[..], &["own", "--force"]].concat());
     assert!(line.contains("holds thesis.txt"), "{line}");
     assert!(at("own/thesis.txt").exists());
     // Nor what somebody has put beside a run, also under a name that other runs have.
@@ -126,7 +128,7 @@ fn nothing_is_written_over_what_is_there() {
     ] {
         let file = at("run").join(name);
         fs::write(&file, "years").unwrap();
-        let line = refused(folder.path(), &[&flow[..], &["run", "--force"]].concat());
+        let line = refused(folder.path(), &[&DISC[..], &["run", "--force"]].concat());
         assert!(
             line.contains(&format!("{name} is not of the run")),
             "{line}"
@@ -439,19 +441,9 @@ fn a_run_goes_on_without_the_folder_of_its_saved_file() {
     let folder = tempfile::tempdir().unwrap();
     let there = folder.path().join("there");
     fs::create_dir(&there).unwrap();
-    let flow = [
-        "flow",
-        "builtin:disc",
-        "--cells",
-        "16",
-        "--steps",
-        "1",
-        "--output",
-        "run",
-    ];
     outcome(
         folder.path(),
-        &[&flow[..], &["--save", "there/disc.png"]].concat(),
+        &[&DISC[..], &["run", "--save", "there/disc.png"]].concat(),
     );
     fs::remove_dir_all(there).unwrap();
     let output = run(folder.path(), &["resume", "run", "--steps", "2"]);

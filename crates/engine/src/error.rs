@@ -13,7 +13,7 @@ pub enum Error {
     ReducedVolume { target: f64, present: f64 },
     #[error(
         "no shape in the box with the volume {volume:.5e} has less surface than {perimeter:.5e}, so that nothing could move (in the plane, length and \
-         area): hold one of the two sizes, or more surface for this volume"
+         area): hold one of the two sizes, or more surface for this volume (a smaller reduced volume)"
     )]
     LeastPerimeter { perimeter: f64, volume: f64 },
     #[error(

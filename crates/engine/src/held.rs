@@ -7,8 +7,7 @@ use solver::Constraints;
 
 use crate::Error;
 
-/// Up to this the measured sizes of a ball are those of one: its reduced volume is nearly 1. Of a shape through the box it is likewise the power
-/// of the least perimeter over its own.
+/// Balls that are measured are round to this part of their perimeter.
 const ROUND: f64 = 1e-4;
 
 /// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
@@ -108,13 +107,14 @@ impl Held {
     /// shape has is refused by [`solver::WillmoreFlow::constrain`].
     pub(crate) fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         let targets = self.targets();
-        if let (Some(perimeter), Some(volume)) = (targets.perimeter, targets.volume) {
-            let part = least_perimeter(grid, volume) / perimeter;
-            if part.powf(D as f64 / (D as f64 - 1.0)) > 1.0 - ROUND {
-                return Err(Error::LeastPerimeter { perimeter, volume });
+        match (targets.perimeter, targets.volume) {
+            (Some(perimeter), Some(volume))
+                if perimeter < (1.0 + ROUND) * least_perimeter(grid, volume) =>
+            {
+                Err(Error::LeastPerimeter { perimeter, volume })
             }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// How many steps reach all targets.

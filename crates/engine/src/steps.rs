@@ -82,7 +82,8 @@ pub struct TimeSteps {
     /// with substeps like the last ones before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_substep: Option<f64>,
-    /// If the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to twelve times.
+    /// If the interface may move by no more than so many widths of it in a step, up to 3: a longer step is halved, up to twelve
+    /// times, a substep down to the smallest one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_move: Option<f64>,
     /// How a step is made.

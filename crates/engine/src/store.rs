@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use solver::FlowState;
 
 use crate::record::to_csv;
-use crate::{Case, Error, Record, Run, Stop};
+use crate::{Case, Error, Flow, Record, Run, Stop};
 
 /// The table of all records in a stored run.
 pub const METRICS: &str = "metrics.csv";
@@ -86,7 +86,8 @@ impl Store {
     /// end, which `ends` names, stay and are no longer part of it.
     ///
     /// # Errors
-    /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already, and for another end time: steps were cut short for the old one.
+    /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already, and of Willmore flow for another end time, since steps
+    /// may have been cut short for the old one.
     pub fn extend<const D: usize>(
         stored: StoredRun,
         case: Case<D>,
@@ -95,9 +96,10 @@ impl Store {
         ends: impl Fn(&str) -> bool,
     ) -> Result<(Self, Run<D>), Error> {
         let stops: Vec<Stop> = read(&stored, &stored.state().notes["case"]["stops"])?;
-        let end = Stop::end(&stops);
-        if end.is_some() && end.map(f64::to_bits) != case.end().map(f64::to_bits) {
-            let reason = "its last step was made for another end time".to_owned();
+        let [old, new] = [Stop::end(&stops), case.end()].map(|end| end.map(f64::to_bits));
+        // Steps of mean curvature flow have one size.
+        if case.flow == Flow::Willmore && old.is_some() && old != new {
+            let reason = "steps may have been cut short for another end time".to_owned();
             return Err(refused(&stored, reason));
         }
         let run = restore(&stored, case, device, &["stops"])?;

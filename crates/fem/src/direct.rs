@@ -7,7 +7,7 @@ pub(crate) use faer::sparse::Pair;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Side};
-use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::Error;
 
@@ -19,18 +19,20 @@ pub(crate) struct Symbolic {
     order: Argsort,
     cholesky: SymbolicLlt<usize>,
     unknowns: usize,
-    pool: &'static ThreadPool,
 }
 
 /// `L L^T`
-pub(crate) struct Factorization {
-    llt: Llt<usize, f64>,
-    pool: &'static ThreadPool,
-}
+pub(crate) struct Factorization(Llt<usize, f64>);
 
-/// Two threads: the order of sums in factorizations and solutions depends on their number.
-static POOL: LazyLock<Result<ThreadPool, ThreadPoolBuildError>> =
-    LazyLock::new(|| ThreadPoolBuilder::new().num_threads(2).build());
+/// The order of sums in factorizations and solutions depends on the number of threads.
+fn on_two_threads<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    static POOL: LazyLock<Option<ThreadPool>> =
+        LazyLock::new(|| ThreadPoolBuilder::new().num_threads(2).build().ok());
+    match &*POOL {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
 
 fn failed(unknowns: usize, reason: &impl std::fmt::Debug) -> Error {
     Error::Factorization {
@@ -47,13 +49,11 @@ impl Symbolic {
                 .map_err(|error| failed(unknowns, &error))?;
         let cholesky = SymbolicLlt::try_new(pattern.as_ref(), Side::Lower)
             .map_err(|error| failed(unknowns, &error))?;
-        let pool = POOL.as_ref().map_err(|error| failed(unknowns, error))?;
         Ok(Self {
             pattern,
             order,
             cholesky,
             unknowns,
-            pool,
         })
     }
 
@@ -63,8 +63,8 @@ impl Symbolic {
             .map_err(|error| failed(self.unknowns, &error))?;
         let factorize =
             || Llt::try_new_with_symbolic(self.cholesky.clone(), matrix.as_ref(), Side::Lower);
-        let (llt, pool) = (self.pool.install(factorize), self.pool);
-        llt.map(|llt| Factorization { llt, pool })
+        on_two_threads(factorize)
+            .map(Factorization)
             .map_err(|error| failed(self.unknowns, &error))
     }
 }
@@ -72,7 +72,7 @@ impl Symbolic {
 impl Factorization {
     pub(crate) fn solve(&self, right: &[f64]) -> Vec<f64> {
         let mut x = Mat::from_fn(right.len(), 1, |i, _| right[i]);
-        self.pool.install(|| self.llt.solve_in_place(&mut x));
+        on_two_threads(|| self.0.solve_in_place(&mut x));
         x.col_as_slice(0).to_vec()
     }
 }

@@ -66,7 +66,7 @@ pub enum LinearSolver {
     /// Conjugate gradients with a Fourier preconditioner.
     #[default]
     ConjugateGradients,
-    /// Sparse Cholesky factorization, as in the paper's comparison.
+    /// Sparse Cholesky factorization on two threads, as in the paper's comparison.
     Direct,
 }
 

@@ -56,7 +56,7 @@ pub mod training;
 
 pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
 pub use error::Error;
-pub use mlp::{Mlp, PAPER_LAYERS, TABLE, forward, parameter_count};
+pub use mlp::{Mlp, PAPER_LAYERS, forward, parameter_count};
 pub use network::{Network, Provenance};
 pub use networks::{NamedNetwork, NeededNetwork, Networks};
 pub use operator::MeanCurvatureOperator;

@@ -13,7 +13,7 @@ use crate::Error;
 pub const PAPER_LAYERS: [usize; 7] = [1, 32, 16, 8, 4, 2, 1];
 
 /// Where `F` is tabulated for the solver where `K*u` stays within about `[-1, 1]`, see [`crate::Network::table`].
-pub const TABLE: TableRange = TableRange {
+pub(crate) const TABLE: TableRange = TableRange {
     low: -2.0,
     high: 2.0,
     cells: 1024,
@@ -166,16 +166,8 @@ impl Mlp {
         Self { layers, parameters }
     }
 
-    /// The quintic Hermite table on [`TABLE`].
-    ///
-    /// # Errors
-    /// [`Error::Operators`] if `F` overflows on the interval.
-    pub fn table(&self) -> Result<HermiteTable, Error> {
-        self.table_on(TABLE)
-    }
-
-    /// The quintic Hermite table on another interval.
-    pub(crate) fn table_on(&self, range: TableRange) -> Result<HermiteTable, Error> {
+    /// The quintic Hermite table on an interval.
+    pub(crate) fn table(&self, range: TableRange) -> Result<HermiteTable, Error> {
         Ok(HermiteTable::new(range, |w| {
             let [f, f1, f2, _] = self.jet(w);
             [f, f1, f2]
@@ -270,7 +262,7 @@ mod tests {
         let parameters = device.tensor::<1>(f.parameters(), [777]);
         let graph = forward(&PAPER_LAYERS, &parameters, device.tensor::<2>(&w, [200, 1]));
         let graph = device.values(graph).unwrap();
-        let table = f.table().unwrap();
+        let table = f.table(TABLE).unwrap();
         for (w, graph) in w.iter().zip(graph) {
             assert!((f.value(*w) - graph).abs() < 1e-13);
             let jet = f.jet(*w);

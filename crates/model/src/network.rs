@@ -4,7 +4,8 @@ use files::{Sha256, hexadecimal};
 use operators::{HermiteTable, TableRange};
 use serde::{Deserialize, Serialize};
 
-use crate::{Calibration, Error, Mlp, Ratios, TABLE};
+use crate::mlp::TABLE;
+use crate::{Calibration, Error, Mlp, Ratios};
 
 impl Ratios {
     /// Checks that the numbers can describe an operator.
@@ -111,9 +112,9 @@ impl Network {
         &self.activation
     }
 
-    /// What the kernel makes of a constant 1, the sum of its values; 1 if it is that up to what training leaves.
+    /// What the kernel makes of a constant 1, the sum of its values; 1 if it is that up to what training leaves, `1e-5`.
     pub(crate) fn mass(&self) -> f64 {
-        const ROUNDED: f64 = 1e-3;
+        const ROUNDED: f64 = 1e-5;
         let mass: f64 = self.kernel.iter().sum();
         if (mass - 1.0).abs() <= ROUNDED {
             1.0
@@ -122,7 +123,7 @@ impl Network {
         }
     }
 
-    /// The table that solvers use as `F`, on the smallest whole multiple of [`TABLE`] that holds `K*u` for all `u` within
+    /// The table that solvers use as `F`, on the smallest whole multiple of `[-2, 2]` that holds `K*u` for all `u` within
     /// `[-1.2, 1.2]`, with cells of the same width.
     ///
     /// # Errors
@@ -136,7 +137,7 @@ impl Network {
             let most = MOST * TABLE.high / REACH;
             return Err(Error::KernelTooLarge { sum, most });
         }
-        self.activation.table_on(TableRange {
+        self.activation.table(TableRange {
             low: times * TABLE.low,
             high: times * TABLE.high,
             cells: times as usize * TABLE.cells,

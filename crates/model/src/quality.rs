@@ -7,6 +7,7 @@ use operators::{ComputeDevice, Transform, circular_convolution, kernel_symbol};
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 
+use crate::mlp::TABLE;
 use crate::ratios::offsets;
 use crate::training::SphereData;
 use crate::{Error, Network};
@@ -42,7 +43,7 @@ pub struct Quality {
     pub transfer_max: f64,
     /// Largest imaginary part of the transfer function: zero for a symmetric kernel.
     pub transfer_imaginary: f64,
-    /// `max |F(+-m) -+ 1|`, `m` being what the kernel makes of 1: up to a thousandth 1 itself, unless the kernel is scaled.
+    /// `max |F(+-m) -+ 1|`, `m` being what the kernel makes of 1: 1 unless the kernel is scaled.
     pub phase_defect: f64,
     /// `max |F'' (w + s) - F''(w)| / max |F''|` on a line finer than any training sample: a spike would show.
     pub activation_roughness: f64,
@@ -160,7 +161,7 @@ fn applied(
         _ => smoothed::<3>(network, data, u, device)?,
     };
     let activation = network.activation();
-    let table = activation.table()?;
+    let table = activation.table(TABLE)?;
     let range = table.range();
     Ok([1.0, -1.0].map(|sign| {
         let smoothed: Vec<f64> = smoothed.iter().map(|w| sign * w).collect();

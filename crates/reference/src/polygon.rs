@@ -83,14 +83,17 @@ pub(crate) fn rounded(
     let gains = collect(edges.len(), |i| width * corners[kinds[i]].gain());
     let (scale, alphas) = along(&edges, &gains);
     let time = width.powi(flow.order());
-    let points = 2.0 * Corner::LARGEST_WAVE * scale / width / folds as f64;
-    if points > (MOST_POINTS / folds) as f64 {
+    let points = 2.0 * Corner::LARGEST_WAVE * scale / width;
+    if points > MOST_POINTS as f64 {
         return Err(Error::Unresolved {
             points: MOST_POINTS,
             time,
         });
     }
-    let grid = Grid::new(folds, (points as usize).next_power_of_two());
+    let grid = Grid::new(
+        folds,
+        ((points / folds as f64) as usize).next_power_of_two(),
+    );
     let transforms: Vec<_> = corners.iter().map(Corner::transform).collect();
     let coefficient = |j: usize| {
         let wave = grid.wave(j);

@@ -41,18 +41,18 @@ pub(crate) fn window(u: f64) -> f64 {
     weight / (weight + EDGE)
 }
 
-/// The largest distance from the interface of `u` to that of `other` in interface widths, but for a fiftieth of it, which may vanish. It is what
-/// `other` says of its own interface where `u` changes its sign: about five where there is none nearby. Zero if `u` has no interface.
+/// The largest distance from the interface of `u` to that of `other` in interface widths, but for a fiftieth of it, which may vanish: `4/3 |atanh v|`
+/// with the values `v` of `other` where `u` changes its sign, about five where there is no interface nearby. Zero if `u` has none.
 pub fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
     const VANISHING: f64 = 0.02;
     let mut depths = other.where_zero(u);
     for value in &mut depths {
         *value = depth(*value).abs();
     }
-    let vanishing = (VANISHING * depths.len() as f64) as usize;
-    if vanishing >= depths.len() {
+    if depths.is_empty() {
         return 0.0;
     }
+    let vanishing = (VANISHING * depths.len() as f64) as usize;
     let (_, depth, _) = depths.select_nth_unstable_by(vanishing, |a, b| b.total_cmp(a));
     4.0 * *depth / 3.0
 }

@@ -104,12 +104,11 @@ pub fn program(options: &Options) -> Result<()> {
 /// The shapes over time, D outlined in green.
 fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let (trajectory, tau) = (one.trajectory, one.tau());
-    let power = |size: f64| format!("2{}", report::superscript(size.log2().round() as i32));
     let mut shown = vec![("step 0".to_owned(), trajectory.case.initial.field()?)];
     for &k in INSIDE {
         if let Some(field) = trajectory.part_field(k)? {
             shown.push((
-                format!("{} of a step", power(0.5_f64.powi(k as i32))),
+                format!("{} of a step", study::power_of_two(0.5_f64.powi(k as i32))),
                 field,
             ));
         }
@@ -137,7 +136,7 @@ fn frames(one: &Inpainted<'_, 2>, n: usize) -> Result<Figure> {
     let title = format!("Inpainting: {}", one.shape.title);
     Ok(Figure::new(title, 4).with_panels(panels).with_note(format!(
         "n = {n}, τ = {}; only the values inside the green frame move. The first step is made in {} parts.{end}",
-        power(tau),
+        study::power_of_two(tau),
         trajectory.substeps(1).len(),
     )))
 }

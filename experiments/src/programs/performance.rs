@@ -91,10 +91,10 @@ pub fn program(options: &Options) -> Result<()> {
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
     let mut session = Session::open("performance", run, parameters)?;
     let mut all = Vec::new();
+    let shape = run.either("disc", "cross");
     for &n in planes {
         let operator = learned(convergence_network(n)?)?;
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
-        let shape = run.either("disc", "cross");
         all.push(Measurement::of(shape, &case, &mut session, turns)?);
     }
     let stored = options.storage.measure(&mut session)?;
@@ -119,7 +119,7 @@ pub fn program(options: &Options) -> Result<()> {
         session.sheet(products, "products")?;
     }
     session.output.write_json("performance.json", &all)?;
-    session.figure(figure(&all, run.either("disc", "cross")), "performance")?;
+    session.figure(figure(&all, shape), "performance")?;
     storages::write(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
 }

@@ -228,41 +228,40 @@ fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> R
         }
         Ok(())
     })?;
-    let hybrid = contenders.iter().find(|timing| timing.row.key == "hybrid");
-    let hybrid = hybrid.map_or(Vec::new(), |hybrid| timing::seconds(&hybrid.run));
+    // The first row is that of the hybrid scheme.
+    let hybrid = timing::seconds(&contenders[0].run);
     for timing in &mut contenders {
         timing.numbers = timing.numbers(&hybrid);
     }
     Ok(contenders)
 }
 
+/// Seconds of the steps that were not measured: those of the hybrid scheme, times the ratio of both over the later half of the measured ones. Steps
+/// become cheaper as corners smooth out, so that the later ones say most about what is to come.
+fn seconds_left(seconds: &[f64], hybrid: &[f64]) -> f64 {
+    let sum = |seconds: &[f64]| seconds.iter().sum::<f64>();
+    // Where not all of its steps are measured either, steps are taken to be alike.
+    let profile = if hybrid.len() == STEPS {
+        hybrid
+    } else {
+        &[1.0; STEPS]
+    };
+    let (count, late) = (seconds.len(), seconds.len() / 2..seconds.len());
+    let ratio = sum(&seconds[late.clone()]) / sum(&profile[late]).max(f64::MIN_POSITIVE);
+    ratio * sum(&profile[count..])
+}
+
 impl Timing {
-    /// Time and work, with the time of all steps in seconds: measured, or, for the rest, as many times as long as the hybrid scheme takes as the
-    /// later half of the measured steps is. Steps become cheaper as corners smooth out: the later ones say most about what is to come.
+    /// Time and work, with the time of all steps in seconds: measured, and for the rest [extrapolated](seconds_left).
     fn numbers(&self, hybrid: &[f64]) -> Numbers {
         let (mut numbers, seconds) = (timing::numbers(&self.run), timing::seconds(&self.run));
         let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
-        let sum = |seconds: &[f64]| seconds.iter().sum::<f64>();
-        // Where not all of its steps are measured either, steps are taken to be alike.
-        let alike = [1.0; STEPS];
-        let profile = if hybrid.len() == STEPS {
-            hybrid
-        } else {
-            &alike
-        };
-        let ratio =
-            sum(&seconds[count / 2..]) / sum(&profile[count / 2..count]).max(f64::MIN_POSITIVE);
-        let rest = if count < STEPS {
-            ratio * sum(&profile[count..])
-        } else {
-            0.0
-        };
         let inner = self.run.statistics().unwrap_or_default();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
         numbers.extend([
             ("measured_steps", count as f64),
             ("measured_seconds", measured),
-            ("seconds", measured + rest),
+            ("seconds", measured + seconds_left(&seconds, hybrid)),
             ("inner_cg_per_step", per_step(inner.cg)),
             ("factorizations_per_step", per_step(inner.factorizations)),
         ]);
@@ -326,4 +325,26 @@ fn figure(timings: &[Timing], shape: &str) -> Figure {
             "Solid: this machine, one run, long rows extrapolated (see the table). Dashed: the paper's times on an A100 (hybrid) and \
              on 64 cores (finite elements).",
         )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_that_were_not_measured_follow_the_hybrid_scheme() {
+        let hybrid: Vec<f64> = (0..STEPS)
+            .map(|step| 1.0 + 9.0 * 0.5_f64.powi(step as i32))
+            .collect();
+        let dearer: Vec<f64> = hybrid.iter().map(|seconds| 3.0 * seconds).collect();
+        let left = seconds_left(&dearer[..10], &hybrid);
+        assert!(
+            (left / dearer[10..].iter().sum::<f64>() - 1.0).abs() < 1e-12,
+            "{left}"
+        );
+        assert!(seconds_left(&dearer, &hybrid).abs() < 1e-12);
+        // Without all of its steps the later ones go on as they were.
+        let alike = seconds_left(&[8.0, 2.0, 2.0], &hybrid[..5]);
+        assert!((alike - 2.0 * (STEPS - 3) as f64).abs() < 1e-9, "{alike}");
+    }
 }

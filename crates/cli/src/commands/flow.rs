@@ -69,7 +69,7 @@ pub fn run(
     let input = command.options().input.clone();
     let mut is_first = true;
     let of_label = |label| {
-        // A signal may have come after the last step of the label before.
+        // A signal may have come after the last step of the label before. Before the first one none is caught: it ends the reading at once.
         if !std::mem::take(&mut is_first) && Interrupt::catch()?.requested() {
             messages.note(&format!("interrupted before label {label}"));
             return Err(Error::Interrupted);

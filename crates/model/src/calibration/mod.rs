@@ -100,12 +100,18 @@ impl Calibration {
 
     /// Whether all of its numbers are, as those in files must be.
     pub(crate) fn is_finite(&self) -> bool {
-        let Factors { energy, metric } = self.factors;
-        let lengths = [self.spontaneous_curvature, self.displacement];
-        let quality = [self.alignment, self.eigenvalue];
-        let spreads = [self.position_spread, self.normal_spread];
-        let all = [[energy, metric], lengths, quality, spreads];
-        all.as_flattened().iter().all(|number| number.is_finite())
+        let Self {
+            factors: Factors { energy, metric },
+            spontaneous_curvature,
+            displacement,
+            alignment,
+            eigenvalue,
+            position_spread,
+            normal_spread,
+        } = *self;
+        let flow = [energy, metric, spontaneous_curvature, displacement];
+        let quality = [alignment, eigenvalue, position_spread, normal_spread];
+        flow.iter().chain(&quality).all(|number| number.is_finite())
     }
 }
 

@@ -160,8 +160,15 @@ impl<const D: usize> WillmoreFlow<D> {
         let between =
             |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
         // Interface of u_k that is gone in U, and of u_{k+1} that is not yet there, is no part of that in the middle: it is seen from those ends.
-        let away = |end| Some(widths_between(end, middle)).filter(|widths| *widths > AWAY);
-        let [gone, new] = [before, after].map(|end| away(end).unwrap_or(0.0) * self.params.eps);
+        let away = |end| {
+            let widths = widths_between(end, middle);
+            if widths > AWAY {
+                widths * self.params.eps
+            } else {
+                0.0
+            }
+        };
+        let [gone, new] = [before, after].map(away);
         let error = match &self.rate {
             Some(start) if self.step >= WITHOUT => {
                 let stages = first.zip_map(second, |first, second| {

@@ -60,20 +60,13 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
     limits.decoding_buffer_size = LARGEST_PAGE;
     limits.intermediate_buffer_size = LARGEST_PAGE;
     let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
-    let (first, element, inverted) = page(&mut reader)?;
-    let (noted, sides, [slope, shift]) = described(&mut reader, element)?;
-    let scale = if inverted {
-        let [sign, largest] = as_stored(element)?;
-        [slope * sign, slope * largest + shift]
-    } else {
-        [slope, shift]
-    };
+    let (first, element, _) = page(&mut reader)?;
+    let (noted, sides, scale) = described(&mut reader, element)?;
     let (mut data, mut pages) = (Vec::new(), 0);
     loop {
         let (size, kind, white_is_zero) = page(&mut reader)?;
-        if (size, kind, white_is_zero) != (first, element, inverted) {
-            let zero = if white_is_zero { "white" } else { "black" };
-            let shown = format!("{} x {} as {kind:?}, zero is {zero}", size[0], size[1]);
+        if (size, kind) != (first, element) {
+            let shown = format!("{} x {} as {kind:?}", size[0], size[1]);
             return bad("page", &shown, "like the first one");
         }
         pages += 1;
@@ -86,6 +79,10 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         let start = data.len();
         data.resize(start + layout.len, 0);
         reader.read_image_bytes(&mut data[start..])?;
+        if white_is_zero {
+            // The crate takes numbers from the largest one; these are those in the file.
+            data[start..].iter_mut().for_each(|byte| *byte = !*byte);
+        }
         if !reader.more_images() {
             break;
         }
@@ -102,22 +99,6 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Volume, FormatError> {
         scale,
     };
     Volume::new(size, DAffine3::from_scale(sides), voxels)
-}
-
-/// The scale that takes numbers back to those in the file where white is zero: the crate inverts them.
-fn as_stored(element: Number) -> Result<[f64; 2], FormatError> {
-    let largest = match element {
-        Number::U8 => f64::from(u8::MAX),
-        Number::U16 => f64::from(u16::MAX),
-        Number::U32 => f64::from(u32::MAX),
-        Number::F32 | Number::F64 => 1.0,
-        // These have no inverse, or no exact one.
-        _ => {
-            let shown = format!("{element:?} with white as zero");
-            return bad("kind of numbers", &shown, "U8, U16, U32, F32 or F64");
-        }
-    };
-    Ok([-1.0, largest])
 }
 
 /// Columns and rows of the page, its numbers, and whether white is zero.
@@ -146,6 +127,11 @@ fn page(reader: &mut Decoder<impl Read + Seek>) -> Result<([u64; 2], Number, boo
     length([size[0], size[1], 2], element, 2 * LARGEST_PAGE as u64)?;
     let meaning = reader.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?;
     let white_is_zero = meaning == Some(PhotometricInterpretation::WhiteIsZero.to_u16());
+    let unsigned = [Number::U8, Number::U16, Number::U32, Number::U64].contains(&element);
+    if white_is_zero && !unsigned {
+        let shown = format!("{element:?} with white as zero");
+        return bad("kind of numbers", &shown, "whole and without sign");
+    }
     Ok((size, element, white_is_zero))
 }
 
