@@ -7,14 +7,14 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use fem::FiniteElementStep;
-use geometry::{Field, Grid, measure::l2_distance, phase_field, shapes::Ball};
+use geometry::{Bricks, Field, Grid, Nodes, measure::l2_distance, phase_field, shapes::Ball};
 use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network, Shipped};
 use operators::{
-    COEFFICIENTS, HermiteTable, HostUpdate, Real, SpectralFilter, TableRange, add_scaled,
-    circular_convolution, extrapolate, inner_product, retract, spectral_filter, tabulated,
-    update_on_host,
+    COEFFICIENTS, HermiteTable, HostUpdate, Interpolation, Real, SharedUpdate, SpectralFilter,
+    TableRange, add_scaled, brick_convolution, circular_convolution, extrapolate, inner_product,
+    retract, spectral_filter, tabulated, update_on_host,
 };
 use solver::{
     Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
@@ -286,6 +286,171 @@ fn operations_take_slices_for_what_they_are() {
     }
 }
 
+/// Passes along every axis with values outside of the bricks as zero, from their definition.
+fn passes<const D: usize>(nodes: &Nodes<D>, x: &[f64], taps: &[f64], adjoint: bool) -> Vec<f64> {
+    let (cells, reach) = (nodes.grid().cells(), taps.len() / 2);
+    let mut x = x.to_vec();
+    for pass in 0..D {
+        let axis = if adjoint { pass } else { D - 1 - pass };
+        let at = |node: usize, k: usize| {
+            let mut place = nodes.place(node);
+            place[axis] = (place[axis] + cells + k - reach) % cells;
+            nodes.at(place).map_or(0.0, |node| x[node])
+        };
+        let tap = |k: usize| taps[if adjoint { taps.len() - 1 - k } else { k }];
+        let sum = |node| (0..taps.len()).map(|k| tap(k) * at(node, k)).sum();
+        x = (0..x.len()).map(sum).collect();
+    }
+    x
+}
+
+fn brick_case<const D: usize>(side: usize, reach: usize) {
+    let active = |place: [usize; D]| place.iter().sum::<usize>() % 3 != 1;
+    let bricks = Bricks::<D>::new(3 * side, side, active, |_| true).unwrap();
+    let (x, taps) = (noise(bricks.len(), 1), noise(2 * reach + 1, 2));
+    let grid = Grid::centred(3 * side, 1.0).unwrap();
+    let nodes = Nodes::on_bricks(grid, Arc::new(bricks.clone()));
+    let count = bricks.places().len();
+    for backend in &backends() {
+        let device = &backend.device;
+        let neighbours = device.tensor::<2>(&bricks.neighbours(), [count, 2 * D]);
+        for adjoint in [false, true] {
+            let found = brick_convolution(
+                device.tensor::<D>(&x, bricks.shape()),
+                device.tensor(&taps, [taps.len()]),
+                neighbours.clone(),
+                adjoint,
+            );
+            let expected = passes(&nodes, &x, &taps, adjoint);
+            let tolerance = backend.tolerance(1e-13, 1e-6);
+            let what = format!("passes over bricks of {side}^{D}, adjoint: {adjoint}");
+            let found = device.values(found).unwrap();
+            close(backend, &found, &expected, tolerance, &what);
+        }
+    }
+}
+
+#[test]
+fn passes_over_bricks_are_their_sums() {
+    brick_case::<2>(16, 5);
+    brick_case::<3>(8, 8);
+}
+
+/// `z += Z S Z^T x` with samples at noisy places of cells in a row, where `S` couples each corner with the next one.
+struct Interpolated {
+    axes: usize,
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+    places: Vec<f32>,
+}
+
+impl Interpolated {
+    /// Cells with more and fewer samples, also with none; every other entry of the vector is one.
+    fn new(axes: usize) -> Self {
+        let counts = [3, 0, 40, 1, 17];
+        let mut starts = vec![0];
+        starts.extend(counts.iter().scan(0, |end, count| {
+            *end += count;
+            Some(*end)
+        }));
+        let samples = *starts.last().unwrap();
+        let places = noise(samples as usize * (axes + 1), 7);
+        Self {
+            axes,
+            starts,
+            entries: (0..samples).map(|i| 2 * ((7 * i) % samples)).collect(),
+            places: places.iter().map(|x| x.abs().fract() as f32).collect(),
+        }
+    }
+
+    /// Entries of the vector with their values of the functions of the corners, cell by cell.
+    fn samples(&self, cell: usize) -> impl Iterator<Item = (usize, Vec<f64>)> {
+        (self.starts[cell]..self.starts[cell + 1]).map(|sample| {
+            let from = sample as usize * (self.axes + 1);
+            let place = &self.places[from..=from + self.axes];
+            let hat = |corner: usize| -> f64 {
+                let along = place[1..].iter().enumerate().map(|(axis, place)| {
+                    let upper = corner >> axis & 1 == 1;
+                    f64::from(if upper { *place } else { 1.0 - place })
+                });
+                f64::from(place[0]) * along.product::<f64>()
+            };
+            let hats = (0..1 << self.axes).map(hat).collect();
+            (self.entries[sample as usize] as usize, hats)
+        })
+    }
+}
+
+impl HostUpdate for Interpolated {
+    fn update<T: Real>(&self, x: &[T], z: &mut [T]) {
+        let corners = 1 << self.axes;
+        let mut sums = vec![0.0; (self.starts.len() - 1) * corners];
+        for (cell, sums) in sums.chunks_mut(corners).enumerate() {
+            for (entry, hats) in self.samples(cell) {
+                for (sum, hat) in sums.iter_mut().zip(hats) {
+                    *sum += hat * x[entry].double();
+                }
+            }
+        }
+        self.at_corners(&mut sums);
+        for (cell, values) in sums.chunks(corners).enumerate() {
+            for (entry, hats) in self.samples(cell) {
+                z[entry] = z[entry] + T::of(dot(&hats, values));
+            }
+        }
+    }
+
+    fn interpolation(&self) -> Option<Interpolation> {
+        Some(Interpolation {
+            axes: self.axes,
+            starts: self.starts.clone(),
+            entries: self.entries.clone(),
+            places: self.places.clone(),
+        })
+    }
+
+    fn at_corners(&self, sums: &mut [f64]) {
+        let before = sums.to_vec();
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += 0.5 * before[(i + 1) % before.len()];
+        }
+    }
+}
+
+/// On a GPU only the values at corners visit the host.
+#[test]
+fn interpolated_updates_are_those_of_whole_vectors() {
+    for axes in [2, 3] {
+        let lattice = Interpolated::new(axes);
+        let count = 2 * lattice.entries.len();
+        let (x, z) = (noise(count, 3), noise(count, 4));
+        let mut expected = z.clone();
+        lattice.update(&x, &mut expected);
+        let update = SharedUpdate::new(lattice);
+        for backend in &backends() {
+            let device = &backend.device;
+            let tensor = |x: &[f64]| -> Tensor<2> { device.tensor(x, [2, count / 2]) };
+            let kept = tensor(&z);
+            // Twice, since arrays on a device are kept.
+            for _ in 0..2 {
+                let found = update_on_host(&tensor(&x), kept.clone(), &update);
+                let found = device.values(found).unwrap();
+                // Weights and places have single precision.
+                let tolerance = backend.tolerance(1e-6, 1e-6);
+                close(backend, &found, &expected, tolerance, "interpolated update");
+            }
+            let kept = device.values(kept).unwrap();
+            close(
+                backend,
+                &kept,
+                &z,
+                backend.tolerance(1e-15, 1e-7),
+                "what was updated",
+            );
+        }
+    }
+}
+
 /// Adds three times the first vector.
 struct AddThrice;
 
@@ -338,7 +503,7 @@ fn vector_operations_are_their_formulas() {
         let tolerance = backend.tolerance(1e-9, 1e-5);
         close(backend, &values(moved), &sum, tolerance, "x + 3 y");
         close(backend, &values(kept), &a, tolerance, "x after x + 3 y");
-        let updated = update_on_host(&tensor(&b), tensor(&a), &Arc::new(AddThrice));
+        let updated = update_on_host(&tensor(&b), tensor(&a), &SharedUpdate::new(AddThrice));
         close(
             backend,
             &values(updated),

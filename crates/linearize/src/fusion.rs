@@ -17,7 +17,7 @@ use burn::tensor::DType;
 pub const ELEMENTWISE: &str = "linearize::elementwise";
 
 /// An operation on entries, `left + right` and so on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "names say it")]
 pub enum Arithmetic {
     Add,

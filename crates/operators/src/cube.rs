@@ -1,22 +1,26 @@
-//! The extension operations on CubeCL backends (wgpu, CUDA): composed of Burn's own operations.
+//! The extension operations on CubeCL backends (wgpu, CUDA).
 
 use burn::backend::{Cube, tensor::FloatTensor};
-use burn::tensor::{DType, Tensor, TensorData};
+use burn::tensor::{DType, Element, Tensor, TensorData};
 use burn_backend::TensorMetadata;
 
-use crate::composed;
+use linearize::{CustomOpRegistry, ELEMENTWISE, Elementwise, Output};
+
+use crate::fft::Real;
 use crate::filter::SpectralFilter;
+use crate::kernels;
 use crate::ops::{GridOps, Operation};
 use crate::profile;
+use crate::spectral;
 use crate::vector::{self, Motion, SharedUpdate, VectorOps};
 
 type CubeTensor = FloatTensor<Cube>;
 
-fn up<const R: usize>(x: CubeTensor) -> Tensor<R> {
+pub(crate) fn up<const R: usize>(x: CubeTensor) -> Tensor<R> {
     Tensor::from_primitive::<Cube>(x)
 }
 
-fn down<const R: usize>(x: Tensor<R>) -> CubeTensor {
+pub(crate) fn down<const R: usize>(x: Tensor<R>) -> CubeTensor {
     x.try_into_primitive::<Cube>()
         .expect("operations on a tensor of this backend stay on it")
 }
@@ -51,20 +55,20 @@ impl GridOps for Cube {
         match operation {
             Operation::Convolution(x, kernel, adjoint) => {
                 gridded!(rank(&x), rank(&kernel), (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
-                    down(composed::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
+                    down(spectral::circular_convolution::<R, K>(up(x), up(kernel), adjoint))
                 })
             }
             Operation::Correlation(x, g, width, axes) => {
                 gridded!(rank(&x), axes, (2 2) (3 2) (3 3) (4 2) (4 3), R, K => {
-                    down(composed::kernel_correlation::<R, K>(up(x), up(g), width))
+                    down(spectral::kernel_correlation::<R, K>(up(x), up(g), width))
                 })
             }
-            Operation::Bricks(x, taps, neighbours, adjoint) => ranked!(rank(&x), 2 3, R => {
-                down(composed::brick_convolution::<R>(up(x), up(taps), up(neighbours), adjoint))
-            }),
-            Operation::Tabulated(w, table, range, order) => ranked!(rank(&w), 1 2 3 4, R => {
-                down(composed::tabulated::<R>(up(w), up(table), range, order))
-            }),
+            Operation::Bricks(x, taps, neighbours, adjoint) => {
+                kernels::brick_convolution(x, taps, neighbours, adjoint)
+            }
+            Operation::Tabulated(w, table, range, order) => {
+                kernels::tabulated(w, table, range, order)
+            }
         }
     }
 }
@@ -78,7 +82,7 @@ impl VectorOps for Cube {
         ranked!(x.shape().num_dims(), 2 3, R => {
             let x = up::<R>(x);
             let symbol = filter.on_device(&x.device(), x.dtype());
-            down(composed::spectral_filter::<R>(x, symbol))
+            down(spectral::spectral_filter::<R>(x, symbol))
         })
     }
 
@@ -94,16 +98,63 @@ impl VectorOps for Cube {
     }
 
     fn update_on_host(x: CubeTensor, z: CubeTensor, update: SharedUpdate) -> CubeTensor {
+        let device = ranked!(x.shape().num_dims(), 1 2 3 4, R => up::<R>(x.clone()).device());
+        if let Some(interpolation) = update.on_device(&device) {
+            let sums = up::<3>(kernels::corner_sums(x, interpolation)).sum_dim(1);
+            let shape = sums.dims();
+            let mut sums = read::<3, f64>(sums);
+            update.at_corners(&mut sums);
+            let values =
+                Tensor::<3>::from_data(TensorData::new(sums, shape), (&device, DType::F32));
+            return kernels::add_interpolated(z, down(values), interpolation);
+        }
         ranked!(x.shape().num_dims(), 1 2 3 4, R => {
             let (x, z) = (up::<R>(x), up::<R>(z));
-            let (shape, device) = (z.dims(), z.device());
-            let read = |t: Tensor<R>| -> Vec<f32> {
-                let data = t.try_into_data_dtype(DType::F32).expect("the device answers");
-                data.try_into_vec().expect("single precision was asked for")
+            let (shape, dtype) = (z.dims(), z.dtype());
+            let data = if dtype == DType::F64 {
+                TensorData::new(updated::<R, f64>(x, z, &update), shape)
+            } else {
+                TensorData::new(updated::<R, f32>(x, z, &update), shape)
             };
-            let (x, mut z) = (read(x), read(z));
-            vector::call(&update, &x, &mut z);
-            down(Tensor::<R>::from_data(TensorData::new(z, shape), (&device, DType::F32)))
+            down(Tensor::<R>::from_data(data, (&device, dtype)))
         })
     }
+}
+
+/// `z` after an update on the host.
+fn updated<const R: usize, T: Real + Element>(
+    x: Tensor<R>,
+    z: Tensor<R>,
+    update: &SharedUpdate,
+) -> Vec<T> {
+    let (x, mut z) = (read::<R, T>(x), read::<R, T>(z));
+    vector::call(update, &x, &mut z);
+    z
+}
+
+/// The values of a tensor.
+fn read<const R: usize, T: Element>(x: Tensor<R>) -> Vec<T> {
+    let data = x
+        .try_into_data_dtype(T::dtype())
+        .expect("the device answers");
+    data.try_into_vec().expect("this precision was asked for")
+}
+
+/// Runs gathered elementwise operations of captured programs.
+pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<Cube>) {
+    registry.register(ELEMENTWISE, |handles, ir, _device| {
+        let program = Elementwise::of(ir);
+        let inputs = ir
+            .inputs
+            .iter()
+            .map(|x| handles.get_float_tensor::<Cube>(x));
+        let results = kernels::elementwise(&program, inputs.collect());
+        for ((result, output), out) in results.into_iter().zip(&program.outputs).zip(&ir.outputs) {
+            let result = ranked!(result.shape().num_dims(), 1 2 3 4, R => match output {
+                Output::Values(_) => down(up::<R>(result).cast(out.dtype)),
+                Output::Sum(_) => down(up::<R>(result).sum().cast(out.dtype)),
+            });
+            handles.register_float_tensor::<Cube>(&out.id, result);
+        }
+    });
 }

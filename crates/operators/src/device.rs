@@ -17,7 +17,7 @@ pub enum DeviceKind {
     NdArray,
     /// burn-wgpu (Vulkan, Metal, DX12) on a GPU, `f32`.
     Wgpu,
-    /// burn-cuda on an NVIDIA GPU, `f32`.
+    /// burn-cuda on an NVIDIA GPU, `f32`, or `f64` if asked for.
     Cuda,
 }
 
@@ -111,16 +111,16 @@ impl ComputeDevice {
         }
     }
 
-    /// The same device in another precision (`f32` on a CPU, for comparisons).
+    /// The same device in another precision: `f32` on a CPU, for comparisons, and `f64` on `cuda`, which is compared with the CPU first.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on a GPU, which computes wrongly there.
+    /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on `wgpu`, which computes wrongly there; [`Error::WrongArithmetic`].
     pub fn with_dtype(mut self, dtype: DType) -> Result<Self, Error> {
         let reason = match dtype {
             DType::F32 => None,
-            DType::F64 if self.kind.is_cpu() => None,
-            _ if self.kind.is_cpu() => Some("has no operations there; use f32 or f64"),
-            _ => Some("is not reliable there; use f32"),
+            DType::F64 if self.kind != DeviceKind::Wgpu => None,
+            DType::F64 => Some("is not reliable there; use f32"),
+            _ => Some("has no operations there; use f32 or f64"),
         };
         if let Some(reason) = reason {
             return Err(Error::Unavailable {
@@ -129,6 +129,10 @@ impl ComputeDevice {
             });
         }
         self.dtype = dtype;
+        #[cfg(feature = "cuda")]
+        if self.kind == DeviceKind::Cuda {
+            crate::device_check::check(&self)?;
+        }
         Ok(self)
     }
 

@@ -17,7 +17,7 @@ struct Symbol {
     /// Normalised by the number of grid points, in the order of [`Transform`]'s spectra.
     double: Vec<f64>,
     single: Vec<f32>,
-    /// The whole symbol where the composed operation ran last.
+    /// The whole symbol on the device where it was needed last.
     uploaded: Mutex<Option<(Device, DType, Tensor<1>)>>,
 }
 
@@ -92,7 +92,7 @@ impl SpectralFilter {
     }
 
     /// The symbol at all frequencies, row-major and not normalised, as a tensor.
-    #[cfg_attr(not(any(test, feature = "wgpu", feature = "cuda")), allow(dead_code))]
+    #[cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
     pub(crate) fn on_device(&self, device: &Device, dtype: DType) -> Tensor<1> {
         let mut uploaded = lock(&self.0.uploaded);
         if let Some((at, of, symbol)) = uploaded.as_ref()

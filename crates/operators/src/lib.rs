@@ -28,8 +28,8 @@
 //!
 //! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
 //! centre in the middle; leading axes beyond the kernel's are a batch. The CPU backends (`flex`, `ndarray`) compute in
-//! the tensor's own precision, `f64` unless asked otherwise, by real FFTs of any length (realfft, rustfft). On a GPU the
-//! operations are composed of Burn tensor operations in `f32`. The same input gives the same bytes on a CPU, whatever
+//! the tensor's own precision, `f64` unless asked otherwise, by real FFTs of any length (realfft, rustfft). On a GPU they
+//! are CubeCL kernels, in `f32` unless asked otherwise. The same input gives the same bytes on a CPU, whatever
 //! the number of threads.
 
 // Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.
@@ -45,7 +45,6 @@ pub mod recording;
 pub mod slices;
 
 mod brick_convolution;
-mod composed;
 mod convolution;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 mod cube;
@@ -58,11 +57,16 @@ mod fft;
 mod filter;
 #[macro_use]
 mod host;
+mod interpolation;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod kernels;
 mod lanes;
 mod open;
 mod ops;
 mod profile;
 mod rules;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod spectral;
 mod table;
 mod tensor;
 mod vector;
@@ -73,6 +77,7 @@ pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
 pub use fft::{Real, Transform};
 pub use filter::SpectralFilter;
+pub use interpolation::Interpolation;
 pub use ops::{GridOps, Operation};
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};

@@ -76,7 +76,10 @@ pub fn extensions() -> Extensions {
         crate::host::register_elementwise(&mut extensions.ndarray);
     }
     #[cfg(any(feature = "wgpu", feature = "cuda"))]
-    register(&mut extensions.cube);
+    {
+        register(&mut extensions.cube);
+        crate::cube::register_elementwise(&mut extensions.cube);
+    }
     extensions
 }
 

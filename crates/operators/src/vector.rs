@@ -1,28 +1,49 @@
 //! Vector operations of iterative solvers, each one pass over memory on all cores, and work on the host in between.
 //!
 //! They are not differentiated, so neither captured nor on the tape.
+#![cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor};
 
 use crate::fft::{Real, is_f64};
 use crate::filter::SpectralFilter;
+use crate::interpolation::{Interpolation, OnDevice};
 
 /// A change of one vector that depends on another and is computed on the host, such as a sparse correction.
 pub trait HostUpdate: Send + Sync {
     /// Changes `z`, given `x`, in the precision of their tensors.
     fn update<T: Real>(&self, x: &[T], z: &mut [T]);
+
+    /// Where it is `z += Z S Z^T x`, with interpolation `Z` from the corners of lattice cells: that interpolation. A GPU does it itself,
+    /// and only values at corners visit the host. Without it whole vectors do.
+    fn interpolation(&self) -> Option<Interpolation> {
+        None
+    }
+
+    /// Then `S`: makes values at the corners of all cells of the sums there, cell by cell.
+    fn at_corners(&self, _sums: &mut [f64]) {}
 }
 
 /// A [`HostUpdate`] of any type.
 trait AnyUpdate: Send + Sync {
     fn double(&self, x: &[f64], z: &mut [f64]);
     fn single(&self, x: &[f32], z: &mut [f32]);
+    fn interpolation(&self) -> Option<Interpolation>;
+    fn at_corners(&self, sums: &mut [f64]);
 }
 
 impl<U: HostUpdate> AnyUpdate for U {
+    fn interpolation(&self) -> Option<Interpolation> {
+        HostUpdate::interpolation(self)
+    }
+
+    fn at_corners(&self, sums: &mut [f64]) {
+        HostUpdate::at_corners(self, sums);
+    }
+
     fn double(&self, x: &[f64], z: &mut [f64]) {
         self.update(x, z);
     }
@@ -35,7 +56,32 @@ impl<U: HostUpdate> AnyUpdate for U {
 /// A shared [`HostUpdate`].
 #[derive(Clone, derive_more::Debug)]
 #[debug("SharedUpdate")]
-pub struct SharedUpdate(Arc<dyn AnyUpdate>);
+pub struct SharedUpdate {
+    update: Arc<dyn AnyUpdate>,
+    /// Its interpolation on the device, if it has one.
+    on_device: Arc<OnceLock<Option<OnDevice>>>,
+}
+
+impl SharedUpdate {
+    /// Shares an update.
+    pub fn new(update: impl HostUpdate + 'static) -> Self {
+        Self {
+            update: Arc::new(update),
+            on_device: Arc::default(),
+        }
+    }
+
+    /// Its interpolation, taken to a device the first time.
+    pub(crate) fn on_device(&self, device: &Device) -> Option<&OnDevice> {
+        let taken = || Some(OnDevice::new(self.update.interpolation()?, device));
+        self.on_device.get_or_init(taken).as_ref()
+    }
+
+    /// See [`HostUpdate::at_corners`].
+    pub(crate) fn at_corners(&self, sums: &mut [f64]) {
+        self.update.at_corners(sums);
+    }
+}
 
 /// How a vector moves by another, entry by entry.
 #[derive(Clone, Copy, Debug)]
@@ -113,22 +159,18 @@ fn moved<const R: usize>(x: Tensor<R>, y: &Tensor<R>, motion: Motion) -> Tensor<
 pub fn update_on_host<const R: usize>(
     x: &Tensor<R>,
     z: Tensor<R>,
-    update: &Arc<impl HostUpdate + 'static>,
+    update: &SharedUpdate,
 ) -> Tensor<R> {
-    let x = x.clone().into_dispatch();
-    let update = SharedUpdate(update.clone());
-    Tensor::from_dispatch(<Dispatch as VectorOps>::update_on_host(
-        x,
-        z.into_dispatch(),
-        update,
-    ))
+    let (x, z) = (x.clone().into_dispatch(), z.into_dispatch());
+    let update = update.clone();
+    Tensor::from_dispatch(<Dispatch as VectorOps>::update_on_host(x, z, update))
 }
 
 /// Calls an update with slices of either precision.
 pub(crate) fn call<T: Real>(update: &SharedUpdate, x: &[T], z: &mut [T]) {
     if is_f64::<T>() {
-        (update.0).double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
+        (update.update).double(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
     } else {
-        (update.0).single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
+        (update.update).single(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(z));
     }
 }

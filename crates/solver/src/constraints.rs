@@ -10,12 +10,12 @@
 //!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile. A perimeter
 //!   that is held alone is restored by the shorter one of both, since the second one sharpens edges.
 
-use std::sync::Arc;
-
 use burn::tensor::Tensor;
 use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
 use geometry::{Field, Grid, Stored, positive};
-use operators::{ComputeDevice, HostUpdate, Real, inner_product, retract, update_on_host};
+use operators::{
+    ComputeDevice, HostUpdate, Real, SharedUpdate, inner_product, retract, update_on_host,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -406,8 +406,8 @@ impl<'a, const D: usize> Held<'a, D> {
         }
         let projection = Projection::new(normals, precondition, self.device)?;
         // To clean the profile, which is much stiffer, it is not needed.
-        let curvature =
-            keep.then(|| Arc::new(Curvature(tangent.sizes.second_derivative(multipliers))));
+        let curvature = keep
+            .then(|| SharedUpdate::new(Curvature(tangent.sizes.second_derivative(multipliers))));
         let mut product = |p: &Tensor<D>| {
             let product = of_energy(p)?;
             Ok(match &curvature {

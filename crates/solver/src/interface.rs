@@ -19,7 +19,7 @@ use faer::linalg::cholesky::llt::solve::solve_in_place;
 use faer::linalg::solvers::Solve;
 use faer::{ColMut, Mat, Par, Side};
 use geometry::{Nodes, parallel};
-use operators::{HostUpdate, Real};
+use operators::{HostUpdate, Interpolation, Real};
 
 use crate::dissection::dissection;
 use crate::samples::{MOST_CORNERS, Samples};
@@ -91,7 +91,7 @@ impl<const D: usize> HostUpdate for InterfaceModes<D> {
     /// Adds `Z A^-1 Z^T r` to `z`.
     fn update<T: Real>(&self, r: &[T], z: &mut [T]) {
         let samples = &self.samples;
-        let parts = parallel::map(samples.corners.len(), 16, &|cell| {
+        let sums = parallel::map(samples.corners.len(), 16, &|cell| {
             let mut sums = [0.0; MOST_CORNERS];
             for sample in samples.of_cell(cell) {
                 let value = sample.weight * r[sample.node as usize].double();
@@ -101,13 +101,7 @@ impl<const D: usize> HostUpdate for InterfaceModes<D> {
             }
             sums
         });
-        let mut coarse = vec![0.0; samples.columns.len()];
-        for (corners, sums) in samples.corners.iter().zip(&parts) {
-            for (&column, sum) in corners.iter().zip(sums).take(1 << D) {
-                coarse[column as usize] += sum;
-            }
-        }
-        (self.inverse)(&mut coarse);
+        let coarse = self.solved(sums.iter().map(|sums| &sums[..1 << D]));
         parallel::over_chunks(z, CHUNK, &|first, z| {
             let from = samples.nodes.partition_point(|s| (s.node as usize) < first);
             for sample in &samples.nodes[from..] {
@@ -122,6 +116,34 @@ impl<const D: usize> HostUpdate for InterfaceModes<D> {
                 *z = T::of(z.double() + sample.weight * sum);
             }
         });
+    }
+
+    fn interpolation(&self) -> Option<Interpolation> {
+        Some(self.samples.interpolation())
+    }
+
+    fn at_corners(&self, sums: &mut [f64]) {
+        let coarse = self.solved(sums.chunks(1 << D));
+        let corners = self.samples.corners.iter();
+        for (values, corners) in sums.chunks_mut(1 << D).zip(corners) {
+            for (value, &column) in values.iter_mut().zip(corners) {
+                *value = coarse[column as usize];
+            }
+        }
+    }
+}
+
+impl<const D: usize> InterfaceModes<D> {
+    /// The solution of the coarse problem for what the cells contribute to the functions at their corners.
+    fn solved<'a>(&self, sums: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
+        let mut coarse = vec![0.0; self.samples.columns.len()];
+        for (corners, sums) in self.samples.corners.iter().zip(sums) {
+            for (&column, sum) in corners.iter().zip(sums) {
+                coarse[column as usize] += sum;
+            }
+        }
+        (self.inverse)(&mut coarse);
+        coarse
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use geometry::Nodes;
-use operators::{ComputeDevice, update_on_host};
+use operators::{ComputeDevice, SharedUpdate, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
@@ -31,7 +31,7 @@ pub(crate) struct Preconditioner<const D: usize> {
     /// Where values may move, if not everywhere: it is projected there from both sides, which keeps it symmetric and positive.
     pub(crate) region: Option<Region<D>>,
     /// None before it [follows](Self::follow) the interface.
-    pub(crate) interface: Option<Arc<InterfaceModes<D>>>,
+    pub(crate) interface: Option<SharedUpdate>,
 }
 
 impl<const D: usize> Preconditioner<D> {
@@ -40,7 +40,7 @@ impl<const D: usize> Preconditioner<D> {
         let u = device.values(u.clone())?;
         let region = self.region.as_ref().map(|region| &*region.nodes);
         let modes = InterfaceModes::new(&self.nodes, &u, self.eps, self.step, region);
-        self.interface = modes.map(Arc::new);
+        self.interface = modes.map(SharedUpdate::new);
         Ok(())
     }
 

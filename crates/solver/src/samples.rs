@@ -1,6 +1,7 @@
 //! The grid nodes of an interface, with their foot points on it, in the cells of a coarse lattice.
 
 use geometry::{Grid, Nodes, parallel};
+use operators::Interpolation;
 
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
 pub(crate) const MOST_CORNERS: usize = 8;
@@ -141,6 +142,21 @@ impl<const D: usize> Samples<D> {
             cells,
             spacing: lattice.width * grid.spacing(),
         })
+    }
+
+    /// How they interpolate.
+    pub(crate) fn interpolation(&self) -> Interpolation {
+        let samples = || self.order.iter().map(|&i| &self.nodes[i as usize]);
+        let places = samples().flat_map(|sample| {
+            let weight = std::iter::once(sample.weight);
+            weight.chain(sample.fraction).map(|place| place as f32)
+        });
+        Interpolation {
+            axes: D,
+            starts: self.starts.clone(),
+            entries: samples().map(|sample| sample.node).collect(),
+            places: places.collect(),
+        }
     }
 
     /// The samples of one lattice cell, in the order of the grid.

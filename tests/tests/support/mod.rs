@@ -5,6 +5,7 @@
 //! (`cargo test -p workbench-tests --features ndarray`), and its executable runs on other machines too. A GPU backend
 //! that cannot be opened fails its tests, unless the environment variable `WILLMORE_ALLOW_MISSING_GPU` is 1.
 
+use burn::tensor::DType;
 use chacha20::ChaCha8Rng;
 use model::training::{SphereData, levenberg_marquardt};
 use model::{Mlp, Network, Provenance, Ratios};
@@ -39,7 +40,7 @@ impl Backend {
     }
 }
 
-/// Every device of this build in its own precision, and the first CPU in single precision too.
+/// Every device of this build in its own precision, the first CPU in single precision too, and GPUs in double precision where they have it.
 ///
 /// # Panics
 /// If one does not open, with the exception above.
@@ -55,17 +56,12 @@ pub fn backends() -> Vec<Backend> {
             Err(error) => panic!("{error}; set WILLMORE_ALLOW_MISSING_GPU=1 to leave a GPU out"),
         }
     }
-    let single = backends
-        .first()
-        .filter(|first| first.is_double())
-        .and_then(|first| {
-            first
-                .device
-                .clone()
-                .with_dtype(burn::tensor::DType::F32)
-                .ok()
-        });
-    backends.extend(single.map(Backend::new));
+    let first = backends.first().filter(|first| first.is_double());
+    let single = first.and_then(|first| first.device.clone().with_dtype(DType::F32).ok());
+    let gpus = backends.iter().filter(|backend| !backend.is_double());
+    let double = gpus.filter_map(|gpu| gpu.device.clone().with_dtype(DType::F64).ok());
+    let others: Vec<_> = single.into_iter().chain(double).collect();
+    backends.extend(others.into_iter().map(Backend::new));
     backends
 }
 

@@ -1,0 +1,14 @@
+//! CubeCL kernels of what a step spends its time in. A thread computes one value, in the precision of the tensors.
+
+mod bricks;
+mod corners;
+mod elementwise;
+mod launch;
+mod tables;
+mod transform;
+
+pub(crate) use bricks::brick_convolution;
+pub(crate) use corners::{add_interpolated, corner_sums};
+pub(crate) use elementwise::elementwise;
+pub(crate) use tables::tabulated;
+pub(crate) use transform::transform;

@@ -1,0 +1,95 @@
+//! Passes over active bricks.
+#![expect(clippy::used_underscore_binding, reason = "the macro does it")]
+
+use burn_backend::TensorMetadata;
+use burn_backend::cubecl::dtype_to_storage_type;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::prelude::*;
+
+use super::launch::{launch, like};
+
+/// See [`crate::brick_convolution`]: one launch for each axis.
+pub(crate) fn brick_convolution(
+    x: CubeTensor,
+    taps: CubeTensor,
+    neighbours: CubeTensor,
+    adjoint: bool,
+) -> CubeTensor {
+    let shape = x.shape();
+    let (axes, side) = (shape.num_dims(), shape[shape.num_dims() - 1]);
+    let [mut x, taps, neighbours] = [x, taps, neighbours].map(into_contiguous);
+    for pass in 0..axes {
+        let axis = if adjoint { pass } else { axes - 1 - pass };
+        let result = like(&x);
+        let (count, threads) = launch(&x);
+        let dtype = dtype_to_storage_type(x.dtype);
+        let width = taps.shape()[0];
+        let client = x.client.clone();
+        brick_pass::launch(
+            &client,
+            count,
+            threads,
+            x.into_buffer_arg(),
+            taps.clone().into_buffer_arg(),
+            neighbours.clone().into_buffer_arg(),
+            result.clone().into_buffer_arg(),
+            side.pow((axes - 1 - axis) as u32),
+            2 * axis,
+            2 * axes,
+            side,
+            side.pow(axes as u32),
+            width,
+            adjoint,
+            dtype,
+        );
+        x = result;
+    }
+    x
+}
+
+/// `sum_k t_k x_{a+k}` along one axis, the taps mirrored if so said. Cells of bricks that are not active count as zero.
+#[cube(launch)]
+fn brick_pass<E: Float>(
+    x: &[E],
+    taps: &[E],
+    neighbours: &[E],
+    result: &mut [E],
+    stride: usize,
+    column: usize,
+    #[comptime] columns: usize,
+    #[comptime] side: usize,
+    #[comptime] volume: usize,
+    #[comptime] width: usize,
+    #[comptime] mirrored: bool,
+    #[define(E)] _dtype: ElemType,
+) {
+    let cell = ABSOLUTE_POS;
+    if cell >= result.len() {
+        terminate!();
+    }
+    let brick = cell / volume;
+    let along = (cell / stride) % side;
+    // The first cell of the line through this one.
+    let line = cell % volume - along * stride;
+    let mut sum = E::new(0.0);
+    #[unroll]
+    for k in 0..width {
+        // Counted from the beginning of the brick before.
+        let place = along + (k + side - width / 2);
+        let mut value = E::new(0.0);
+        if place >= side && place < 2 * side {
+            value = x[brick * volume + line + (place - side) * stride];
+        } else {
+            let next = usize::cast_from(place >= side);
+            let number = neighbours[brick * columns + column + next];
+            if number >= E::new(0.0) {
+                let other = usize::cast_from(number);
+                value = x[other * volume + line + (place % side) * stride];
+            }
+        }
+        let tap = if mirrored { width - 1 - k } else { k };
+        sum += taps[tap] * value;
+    }
+    result[cell] = sum;
+}

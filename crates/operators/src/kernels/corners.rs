@@ -1,0 +1,128 @@
+//! Interpolation between the corners of lattice cells, and its transpose.
+#![expect(clippy::used_underscore_binding, reason = "the macro does it")]
+
+use burn_backend::cubecl::dtype_to_storage_type;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::prelude::*;
+
+use super::launch::{buffer, launch, primitive};
+use crate::interpolation::OnDevice;
+
+/// Samples of a cell are summed in so many parts.
+const PARTS: usize = 16;
+
+/// `Z^T x` before cells that share a corner are added up: `[cells, parts, corners]`, to be summed over the parts.
+pub(crate) fn corner_sums(x: CubeTensor, interpolation: &OnDevice) -> CubeTensor {
+    let x = into_contiguous(x);
+    let cells = interpolation.starts.dims()[0] - 1;
+    let (client, device) = (x.client.clone(), x.device.clone());
+    let shape = [cells, PARTS, 1 << interpolation.axes];
+    let sums = empty_device_contiguous_dtype(client.clone(), device, shape.into(), x.dtype);
+    let (count, threads) = launch(&sums);
+    let dtype = dtype_to_storage_type(x.dtype);
+    corner_sum::launch(
+        &client,
+        count,
+        threads,
+        x.into_buffer_arg(),
+        buffer(&interpolation.starts),
+        buffer(&interpolation.entries),
+        buffer(&interpolation.places),
+        sums.clone().into_buffer_arg(),
+        interpolation.axes,
+        dtype,
+    );
+    sums
+}
+
+#[cube(launch)]
+fn corner_sum<E: Float>(
+    x: &[E],
+    starts: &[i32],
+    entries: &[i32],
+    places: &[f32],
+    sums: &mut [E],
+    #[comptime] axes: usize,
+    #[define(E)] _dtype: ElemType,
+) {
+    if ABSOLUTE_POS >= sums.len() {
+        terminate!();
+    }
+    let corners = comptime!(1usize << axes);
+    let corner = ABSOLUTE_POS % corners;
+    let part = (ABSOLUTE_POS / corners) % PARTS;
+    let cell = ABSOLUTE_POS / (corners * PARTS);
+    let end = usize::cast_from(starts[cell + 1]);
+    let mut sample = usize::cast_from(starts[cell]) + part;
+    let mut sum = E::new(0.0);
+    while sample < end {
+        let entry = usize::cast_from(entries[sample]);
+        sum += x[entry] * E::cast_from(hat(places, sample, corner, axes));
+        sample += PARTS;
+    }
+    sums[ABSOLUTE_POS] = sum;
+}
+
+/// `z + Z v` for values at the corners of all cells.
+pub(crate) fn add_interpolated(
+    z: CubeTensor,
+    values: CubeTensor,
+    interpolation: &OnDevice,
+) -> CubeTensor {
+    let z = into_contiguous(if z.can_mut() { z } else { z.copy() });
+    let (count, threads) = launch(&primitive(&interpolation.entries));
+    let dtype = dtype_to_storage_type(z.dtype);
+    add_interpolant::launch(
+        &z.client,
+        count,
+        threads,
+        z.clone().into_buffer_arg(),
+        values.into_buffer_arg(),
+        buffer(&interpolation.cells),
+        buffer(&interpolation.entries),
+        buffer(&interpolation.places),
+        interpolation.axes,
+        dtype,
+    );
+    z
+}
+
+#[cube(launch)]
+fn add_interpolant<E: Float>(
+    z: &mut [E],
+    values: &[E],
+    cells: &[i32],
+    entries: &[i32],
+    places: &[f32],
+    #[comptime] axes: usize,
+    #[define(E)] _dtype: ElemType,
+) {
+    let sample = ABSOLUTE_POS;
+    if sample >= entries.len() {
+        terminate!();
+    }
+    let corners = comptime!(1usize << axes);
+    let first = usize::cast_from(cells[sample]) * corners;
+    let mut sum = E::new(0.0);
+    #[unroll]
+    for corner in 0..corners {
+        sum += values[first + corner] * E::cast_from(hat(places, sample, corner, axes));
+    }
+    z[usize::cast_from(entries[sample])] += sum;
+}
+
+/// The weight of a sample times the hat function of a corner of its cell.
+#[cube]
+fn hat(places: &[f32], sample: usize, corner: usize, #[comptime] axes: usize) -> f32 {
+    let first = sample * (axes + 1);
+    let mut product = places[first];
+    #[unroll]
+    for axis in 0..axes {
+        let place = places[first + 1 + axis];
+        let upper = (corner >> axis) % 2 == 1;
+        product *= select(upper, place, 1.0f32 - place);
+    }
+    product
+}

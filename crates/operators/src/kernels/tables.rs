@@ -1,0 +1,92 @@
+//! Tabulated functions.
+#![expect(clippy::used_underscore_binding, reason = "the macro does it")]
+
+use burn_backend::cubecl::dtype_to_storage_type;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::prelude::*;
+
+use super::launch::{launch, like};
+use crate::table::{COEFFICIENTS, TableRange, factor};
+
+/// See [`crate::tabulated`].
+pub(crate) fn tabulated(
+    w: CubeTensor,
+    table: CubeTensor,
+    range: TableRange,
+    order: usize,
+) -> CubeTensor {
+    let [w, table] = [w, table].map(into_contiguous);
+    let result = like(&w);
+    let (count, threads) = launch(&w);
+    let dtype = dtype_to_storage_type(w.dtype);
+    let client = w.client.clone();
+    table_value::launch(
+        &client,
+        count,
+        threads,
+        w.into_buffer_arg(),
+        table.into_buffer_arg(),
+        result.clone().into_buffer_arg(),
+        InputScalar::new(range.low, dtype),
+        InputScalar::new(range.width(), dtype),
+        range.cells,
+        order,
+        dtype,
+    );
+    result
+}
+
+/// The `order`-th derivative of a [table](crate::HermiteTable) at every value, beyond its ends that of the Taylor polynomial of degree 2.
+#[cube(launch)]
+fn table_value<E: Float>(
+    w: &[E],
+    table: &[E],
+    result: &mut [E],
+    low: InputScalar,
+    width: InputScalar,
+    cells: usize,
+    #[comptime] order: usize,
+    #[define(E)] _dtype: ElemType,
+) {
+    let place = ABSOLUTE_POS;
+    if place >= result.len() {
+        terminate!();
+    }
+    let width = width.get::<E>();
+    let s = (w[place] - low.get::<E>()) / width;
+    let inside = clamp(s, E::new(0.0), E::cast_from(cells));
+    let cell = clamp_max(usize::cast_from(inside), cells - 1);
+    let t = inside - E::cast_from(cell);
+    let first = cell * COEFFICIENTS;
+    // In units of cells; zero inside.
+    let beyond = s - inside;
+    let mut sum = derivative::<E>(table, first, t, order);
+    if comptime!(order > 2) {
+        sum = select(beyond == E::new(0.0), sum, E::new(0.0));
+    }
+    if comptime!(order < 2) {
+        sum += derivative::<E>(table, first, t, order + 1) * beyond;
+    }
+    if comptime!(order == 0) {
+        sum += derivative::<E>(table, first, t, order + 2) * beyond * beyond * E::new(0.5);
+    }
+    #[unroll]
+    for _ in 0..order {
+        sum /= width;
+    }
+    result[place] = sum;
+}
+
+/// The `order`-th derivative in `t` of the polynomial whose coefficients begin at `first`.
+#[cube]
+fn derivative<E: Float>(table: &[E], first: usize, t: E, #[comptime] order: usize) -> E {
+    let mut sum = E::new(0.0);
+    #[unroll]
+    for k in 0..comptime!(COEFFICIENTS.saturating_sub(order)) {
+        let j = comptime!(COEFFICIENTS - 1 - k);
+        let factor = comptime!(factor(1.0, j, order) as f32);
+        sum = sum * t + table[first + j] * E::new(factor);
+    }
+    sum
+}
