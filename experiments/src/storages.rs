@@ -198,7 +198,7 @@ pub fn write(stored: &[Measured], session: &mut Session) -> Result<()> {
         session.metric(&format!("exponent.bricks.{name}"), exponent(stored, name))?;
     }
     let steps = session.options.either(QUICK_STEPS, STEPS);
-    session.figure(figure(stored, steps), "storages")
+    session.figure(figure(stored, steps, &session.device), "storages")
 }
 
 fn surfaces(measured: &[Measured], storage: Storage, name: &str) -> impl Iterator<Item = [f64; 2]> {
@@ -215,7 +215,7 @@ fn exponent(measured: &[Measured], name: &str) -> Option<f64> {
 }
 
 /// Seconds and memory against `n`, a colour for each storage.
-fn figure(measured: &[Measured], steps: usize) -> Figure {
+fn figure(measured: &[Measured], steps: usize, device: &ComputeDevice) -> Figure {
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
             let points: Vec<_> = surfaces(measured, storage, name).collect();
@@ -235,8 +235,8 @@ fn figure(measured: &[Measured], steps: usize) -> Figure {
         .with_panel(panel("size", "stored cells", "active_cells"))
         .with_shared_legend()
         .with_note(format!(
-            "{steps} steps of Willmore flow, tau = h⁴/32 doubled after every step, eps = 2h; {} threads.{}",
-            rayon::current_num_threads(),
+            "{steps} steps of Willmore flow, tau = h⁴/32 doubled after every step, eps = 2h; on {}.{}",
+            timing::machine(device),
             fitted.unwrap_or_default()
         ))
 }

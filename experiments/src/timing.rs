@@ -15,6 +15,18 @@ pub fn exponent(points: &[[f64; 2]]) -> Option<f64> {
     (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
 }
 
+/// What computes, for a note below a figure.
+pub fn machine(device: &ComputeDevice) -> String {
+    let threads = format!("{} threads", rayon::current_num_threads());
+    if device.kind().is_cpu() {
+        return threads;
+    }
+    format!(
+        "{} and {threads} of the host, whose memory is shown",
+        device.kind()
+    )
+}
+
 /// The networks of the convergence tests at some resolutions, and that of surfaces.
 pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen> {
     let needs = cells.iter().map(|&n| convergence_network(n));

@@ -1,4 +1,5 @@
-//! CubeCL kernels of what a step spends its time in. A thread computes one value, in the precision of the tensors.
+//! CubeCL kernels of what a step spends its time in. A thread computes one value, in the precision of the tensors. How many there are is an
+//! argument, since the lengths of buffers on CUDA are those of their memory, which is longer.
 
 mod bricks;
 mod corners;

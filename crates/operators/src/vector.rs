@@ -3,12 +3,12 @@
 //! They are not differentiated, so neither captured nor on the tape.
 #![cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex};
 
 use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
 use burn::tensor::{Device, Tensor};
 
-use crate::fft::{Real, is_f64};
+use crate::fft::{Real, is_f64, lock};
 use crate::filter::SpectralFilter;
 use crate::interpolation::{Interpolation, OnDevice};
 
@@ -58,8 +58,8 @@ impl<U: HostUpdate> AnyUpdate for U {
 #[debug("SharedUpdate")]
 pub struct SharedUpdate {
     update: Arc<dyn AnyUpdate>,
-    /// Its interpolation on the device, if it has one.
-    on_device: Arc<OnceLock<Option<OnDevice>>>,
+    /// Its interpolation where it ran last, if it has one.
+    on_device: Arc<Mutex<Option<(Device, Arc<OnDevice>)>>>,
 }
 
 impl SharedUpdate {
@@ -71,10 +71,17 @@ impl SharedUpdate {
         }
     }
 
-    /// Its interpolation, taken to a device the first time.
-    pub(crate) fn on_device(&self, device: &Device) -> Option<&OnDevice> {
-        let taken = || Some(OnDevice::new(self.update.interpolation()?, device));
-        self.on_device.get_or_init(taken).as_ref()
+    /// Its interpolation, taken to the device the first time.
+    pub(crate) fn on_device(&self, device: &Device) -> Option<Arc<OnDevice>> {
+        let mut kept = lock(&self.on_device);
+        if let Some((at, arrays)) = kept.as_ref()
+            && at == device
+        {
+            return Some(arrays.clone());
+        }
+        let arrays = Arc::new(OnDevice::new(self.update.interpolation()?, device));
+        *kept = Some((device.clone(), arrays.clone()));
+        Some(arrays)
     }
 
     /// See [`HostUpdate::at_corners`].

@@ -119,7 +119,7 @@ pub fn program(options: &Options) -> Result<()> {
         session.sheet(products, "products")?;
     }
     session.output.write_json("performance.json", &all)?;
-    session.figure(figure(&all, shape), "performance")?;
+    session.figure(figure(&all, shape, &session.device), "performance")?;
     storages::write(&stored, &mut session)?;
     session.finish("Willmore steps by the hybrid scheme on this machine")
 }
@@ -241,7 +241,7 @@ fn parts<const D: usize>(run: &Run<D>, floor_ms: f64) -> [(&'static str, f64); 7
 }
 
 /// The cost of a step, and where the time goes: a colour for each part, a line style for each dimension.
-fn figure(all: &[Measurement], plane: &str) -> Figure {
+fn figure(all: &[Measurement], plane: &str, device: &ComputeDevice) -> Figure {
     let solids = all.iter().filter(|m| m.cells.len() == 3);
     let solids = solids.map(|m| format!("a {} at n = {}", m.case, m.n));
     let solids: Vec<String> = solids.collect();
@@ -275,10 +275,10 @@ fn figure(all: &[Measurement], plane: &str) -> Figure {
         .with_panel(shares.with_entries(parts).with_entries(entries))
         .with_shared_legend()
         .with_note(format!(
-            "2D: a {}, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: {}, eps = 2h, tau = 2⁻¹⁸. {} threads. Cost of a step ~ unknowns to the power {}.",
+            "2D: a {}, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: {}, eps = 2h, tau = 2⁻¹⁸. On {}. Cost of a step ~ unknowns to the power {}.",
             plane,
             solids.join(", "),
-            rayon::current_num_threads(),
+            timing::machine(device),
             slopes.join(" and ")
         ))
 }

@@ -34,6 +34,7 @@ pub(crate) fn brick_convolution(
             taps.clone().into_buffer_arg(),
             neighbours.clone().into_buffer_arg(),
             result.clone().into_buffer_arg(),
+            shape.num_elements(),
             side.pow((axes - 1 - axis) as u32),
             2 * axis,
             2 * axes,
@@ -55,6 +56,7 @@ fn brick_pass<E: Float>(
     taps: &[E],
     neighbours: &[E],
     result: &mut [E],
+    len: usize,
     stride: usize,
     column: usize,
     #[comptime] columns: usize,
@@ -65,7 +67,7 @@ fn brick_pass<E: Float>(
     #[define(E)] _dtype: ElemType,
 ) {
     let cell = ABSOLUTE_POS;
-    if cell >= result.len() {
+    if cell >= len {
         terminate!();
     }
     let brick = cell / volume;

@@ -1,6 +1,7 @@
 //! Interpolation between the corners of lattice cells, and its transpose.
 #![expect(clippy::used_underscore_binding, reason = "the macro does it")]
 
+use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
@@ -31,6 +32,7 @@ pub(crate) fn corner_sums(x: CubeTensor, interpolation: &OnDevice) -> CubeTensor
         buffer(&interpolation.entries),
         buffer(&interpolation.places),
         sums.clone().into_buffer_arg(),
+        sums.shape().num_elements(),
         interpolation.axes,
         dtype,
     );
@@ -44,10 +46,11 @@ fn corner_sum<E: Float>(
     entries: &[i32],
     places: &[f32],
     sums: &mut [E],
+    len: usize,
     #[comptime] axes: usize,
     #[define(E)] _dtype: ElemType,
 ) {
-    if ABSOLUTE_POS >= sums.len() {
+    if ABSOLUTE_POS >= len {
         terminate!();
     }
     let corners = comptime!(1usize << axes);
@@ -83,6 +86,7 @@ pub(crate) fn add_interpolated(
         buffer(&interpolation.cells),
         buffer(&interpolation.entries),
         buffer(&interpolation.places),
+        interpolation.entries.dims()[0],
         interpolation.axes,
         dtype,
     );
@@ -96,11 +100,12 @@ fn add_interpolant<E: Float>(
     cells: &[i32],
     entries: &[i32],
     places: &[f32],
+    len: usize,
     #[comptime] axes: usize,
     #[define(E)] _dtype: ElemType,
 ) {
     let sample = ABSOLUTE_POS;
-    if sample >= entries.len() {
+    if sample >= len {
         terminate!();
     }
     let corners = comptime!(1usize << axes);

@@ -76,10 +76,10 @@ pub(crate) fn elementwise(program: &Elementwise, inputs: Vec<CubeTensor>) -> Vec
     let dtype = dtype_to_storage_type(longest.dtype);
     let (mut from, mut to, mut with) = (SequenceArg::new(), SequenceArg::new(), SequenceArg::new());
     for x in inputs {
-        from.push(into_contiguous(x).into_tensor_arg());
+        from.push(into_contiguous(x).into_buffer_arg());
     }
     for x in &results {
-        to.push(x.clone().into_tensor_arg());
+        to.push(x.clone().into_buffer_arg());
     }
     for number in numbers {
         with.push(InputScalar::new(number, dtype));
@@ -101,8 +101,8 @@ pub(crate) fn elementwise(program: &Elementwise, inputs: Vec<CubeTensor>) -> Vec
 
 #[cube(launch)]
 fn entrywise<E: Float>(
-    inputs: &Sequence<OwnedTensor<E>>,
-    results: &mut Sequence<OwnedTensor<E>>,
+    inputs: &Sequence<Box<[E]>>,
+    results: &mut Sequence<Box<[E]>>,
     numbers: &Sequence<InputScalar>,
     len: usize,
     #[comptime] form: Form,

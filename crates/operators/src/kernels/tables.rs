@@ -1,6 +1,7 @@
 //! Tabulated functions.
 #![expect(clippy::used_underscore_binding, reason = "the macro does it")]
 
+use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
@@ -28,6 +29,7 @@ pub(crate) fn tabulated(
         w.into_buffer_arg(),
         table.into_buffer_arg(),
         result.clone().into_buffer_arg(),
+        result.shape().num_elements(),
         InputScalar::new(range.low, dtype),
         InputScalar::new(range.width(), dtype),
         range.cells,
@@ -43,6 +45,7 @@ fn table_value<E: Float>(
     w: &[E],
     table: &[E],
     result: &mut [E],
+    len: usize,
     low: InputScalar,
     width: InputScalar,
     cells: usize,
@@ -50,7 +53,7 @@ fn table_value<E: Float>(
     #[define(E)] _dtype: ElemType,
 ) {
     let place = ABSOLUTE_POS;
-    if place >= result.len() {
+    if place >= len {
         terminate!();
     }
     let width = width.get::<E>();

@@ -35,6 +35,7 @@ pub(crate) fn transform(
         roots.into_buffer_arg(),
         of_re.clone().into_buffer_arg(),
         of_im.clone().into_buffer_arg(),
+        shape.num_elements(),
         shape[axis],
         shape[axis + 1..].iter().product(),
         real,
@@ -51,6 +52,7 @@ fn transform_value<E: Float>(
     roots: &[E],
     of_re: &mut [E],
     of_im: &mut [E],
+    len: usize,
     n: usize,
     stride: usize,
     #[comptime] real: bool,
@@ -58,7 +60,7 @@ fn transform_value<E: Float>(
     #[define(E)] _dtype: ElemType,
 ) {
     let place = ABSOLUTE_POS;
-    if place >= of_re.len() {
+    if place >= len {
         terminate!();
     }
     let frequency = (place / stride) % n;
