@@ -341,7 +341,7 @@ struct Interpolated {
     axes: usize,
     starts: Vec<u32>,
     entries: Vec<u32>,
-    places: Vec<f32>,
+    places: Vec<f64>,
 }
 
 impl Interpolated {
@@ -359,7 +359,7 @@ impl Interpolated {
             axes,
             starts,
             entries: (0..samples).map(|i| 2 * ((7 * i) % samples)).collect(),
-            places: places.iter().map(|x| x.abs().fract() as f32).collect(),
+            places: places.iter().map(|x| x.abs().fract()).collect(),
         }
     }
 
@@ -371,9 +371,9 @@ impl Interpolated {
             let hat = |corner: usize| -> f64 {
                 let along = place[1..].iter().enumerate().map(|(axis, place)| {
                     let upper = corner >> axis & 1 == 1;
-                    f64::from(if upper { *place } else { 1.0 - place })
+                    if upper { *place } else { 1.0 - place }
                 });
-                f64::from(place[0]) * along.product::<f64>()
+                place[0] * along.product::<f64>()
             };
             let hats = (0..1 << self.axes).map(hat).collect();
             (self.entries[sample as usize] as usize, hats)
@@ -435,8 +435,7 @@ fn interpolated_updates_are_those_of_whole_vectors() {
             for _ in 0..2 {
                 let found = update_on_host(&tensor(&x), kept.clone(), &update);
                 let found = device.values(found).unwrap();
-                // Weights and places have single precision.
-                let tolerance = backend.tolerance(1e-6, 1e-6);
+                let tolerance = backend.tolerance(1e-14, 1e-6);
                 close(backend, &found, &expected, tolerance, "interpolated update");
             }
             let kept = device.values(kept).unwrap();

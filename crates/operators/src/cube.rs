@@ -99,13 +99,13 @@ impl VectorOps for Cube {
 
     fn update_on_host(x: CubeTensor, z: CubeTensor, update: SharedUpdate) -> CubeTensor {
         let device = ranked!(x.shape().num_dims(), 1 2 3 4, R => up::<R>(x.clone()).device());
-        if let Some(interpolation) = update.on_device(&device) {
-            let sums = up::<3>(kernels::corner_sums(x, &interpolation)).sum_dim(1);
+        if let Some(interpolation) = update.on_device(&device, x.dtype()) {
+            let sums = up::<2>(kernels::corner_sums(x, &interpolation));
             let shape = sums.dims();
-            let mut sums = read::<3, f64>(sums);
+            let mut sums = read::<2, f64>(sums);
             update.at_corners(&mut sums);
             let values =
-                Tensor::<3>::from_data(TensorData::new(sums, shape), (&device, DType::F32));
+                Tensor::<2>::from_data(TensorData::new(sums, shape), (&device, DType::F32));
             return kernels::add_interpolated(z, down(values), &interpolation);
         }
         ranked!(x.shape().num_dims(), 1 2 3 4, R => {

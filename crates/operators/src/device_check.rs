@@ -47,7 +47,11 @@ pub(crate) fn check(device: &ComputeDevice) -> Result<(), Error> {
     )?;
 
     let expected: Vec<f64> = u.iter().map(|v| v.exp().tanh()).collect();
-    compare(device, "exp and tanh", x.exp().tanh(), &expected)
+    compare(device, "exp and tanh", x.clone().exp().tanh(), &expected)?;
+
+    let sum = |column: usize| u.iter().skip(column).step_by(N).sum();
+    let expected: Vec<f64> = (0..N).map(sum).collect();
+    compare(device, "sums along an axis", x.sum_dim(0), &expected)
 }
 
 fn compare(

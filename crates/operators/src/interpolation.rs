@@ -13,10 +13,10 @@ pub struct Interpolation {
     /// Which entry of the vector each sample is.
     pub entries: Vec<u32>,
     /// Of each sample its weight, and its place along each axis, from 0 to 1.
-    pub places: Vec<f32>,
+    pub places: Vec<f64>,
 }
 
-/// An [`Interpolation`] in the memory of a device.
+/// An [`Interpolation`] in the memory of a device, in the precision of its vectors.
 pub(crate) struct OnDevice {
     pub(crate) axes: usize,
     pub(crate) starts: Tensor<1, Int>,
@@ -27,7 +27,7 @@ pub(crate) struct OnDevice {
 }
 
 impl OnDevice {
-    pub(crate) fn new(interpolation: Interpolation, device: &Device) -> Self {
+    pub(crate) fn new(interpolation: Interpolation, device: &Device, dtype: DType) -> Self {
         let Interpolation {
             axes,
             starts,
@@ -50,7 +50,7 @@ impl OnDevice {
             starts: whole(starts),
             entries: whole(entries),
             cells: whole(cells),
-            places: Tensor::from_data(TensorData::new(places, [count]), (device, DType::F32)),
+            places: Tensor::from_data(TensorData::new(places, [count]), (device, dtype)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Operations of Fourier transforms on CubeCL backends, composed of Burn's own and of transforms along single axes.
 //!
-//! A transform along an axis is the sum that defines it, in a [kernel](crate::kernels): any length, and the precision of its tensors. Products
+//! A transform along an axis is a [kernel](crate::kernels): any length, and the precision of its tensors. Products
 //! with the matrix of the transform would be faster on some GPUs, but Burn's matrix products round single precision to 10 bits where there are
 //! tensor cores, which is off by 2e-4 on an NVIDIA H100. (burn-signal's FFT takes powers of two only.)
 
@@ -44,7 +44,8 @@ fn transform<const R: usize>(
 ) -> Complex<R> {
     for axis in R - axes..R {
         let roots = roots_of_unity(re.dims()[axis], &re.device(), re.dtype());
-        let (of_re, of_im) = kernels::transform(down(re), im.map(down), down(roots), axis, inverse);
+        let (of_re, of_im) =
+            kernels::transform(down(re), im.map(down), &down(roots), axis, inverse);
         (re, im) = (up(of_re), Some(up(of_im)));
     }
     (re, im)

@@ -6,7 +6,7 @@
 use std::sync::{Arc, Mutex};
 
 use burn::backend::{Backend, Dispatch, backend_extension, tensor::FloatTensor};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{DType, Device, Tensor};
 
 use crate::fft::{Real, is_f64, lock};
 use crate::filter::SpectralFilter;
@@ -59,7 +59,7 @@ impl<U: HostUpdate> AnyUpdate for U {
 pub struct SharedUpdate {
     update: Arc<dyn AnyUpdate>,
     /// Its interpolation where it ran last, if it has one.
-    on_device: Arc<Mutex<Option<(Device, Arc<OnDevice>)>>>,
+    on_device: Arc<Mutex<Option<(Device, DType, Arc<OnDevice>)>>>,
 }
 
 impl SharedUpdate {
@@ -71,16 +71,16 @@ impl SharedUpdate {
         }
     }
 
-    /// Its interpolation, taken to the device the first time.
-    pub(crate) fn on_device(&self, device: &Device) -> Option<Arc<OnDevice>> {
+    /// Its interpolation, taken to the device in this precision the first time.
+    pub(crate) fn on_device(&self, device: &Device, dtype: DType) -> Option<Arc<OnDevice>> {
         let mut kept = lock(&self.on_device);
-        if let Some((at, arrays)) = kept.as_ref()
-            && at == device
+        if let Some((at, of, arrays)) = kept.as_ref()
+            && (at, *of) == (device, dtype)
         {
             return Some(arrays.clone());
         }
-        let arrays = Arc::new(OnDevice::new(self.update.interpolation()?, device));
-        *kept = Some((device.clone(), arrays.clone()));
+        let arrays = Arc::new(OnDevice::new(self.update.interpolation()?, device, dtype));
+        *kept = Some((device.clone(), dtype, arrays.clone()));
         Some(arrays)
     }
 

@@ -149,7 +149,7 @@ impl<const D: usize> Samples<D> {
         let samples = || self.order.iter().map(|&i| &self.nodes[i as usize]);
         let places = samples().flat_map(|sample| {
             let weight = std::iter::once(sample.weight);
-            weight.chain(sample.fraction).map(|place| place as f32)
+            weight.chain(sample.fraction)
         });
         Interpolation {
             axes: D,

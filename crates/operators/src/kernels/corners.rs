@@ -1,7 +1,7 @@
 //! Interpolation between the corners of lattice cells, and its transpose.
 #![expect(clippy::used_underscore_binding, reason = "the macro does it")]
 
-use burn_backend::TensorMetadata;
+use burn_backend::Shape;
 use burn_backend::cubecl::dtype_to_storage_type;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
@@ -14,15 +14,17 @@ use crate::interpolation::OnDevice;
 /// Samples of a cell are summed in so many parts.
 const PARTS: usize = 16;
 
-/// `Z^T x` before cells that share a corner are added up: `[cells, parts, corners]`, to be summed over the parts.
+/// `Z^T x` before cells that share a corner are added up: `[cells, 2^axes]`.
 pub(crate) fn corner_sums(x: CubeTensor, interpolation: &OnDevice) -> CubeTensor {
     let x = into_contiguous(x);
-    let cells = interpolation.starts.dims()[0] - 1;
-    let (client, device) = (x.client.clone(), x.device.clone());
-    let shape = [cells, PARTS, 1 << interpolation.axes];
-    let sums = empty_device_contiguous_dtype(client.clone(), device, shape.into(), x.dtype);
-    let (count, threads) = launch(&sums);
-    let dtype = dtype_to_storage_type(x.dtype);
+    let (cells, corners) = (interpolation.starts.dims()[0] - 1, 1 << interpolation.axes);
+    let (client, device, dtype) = (x.client.clone(), x.device.clone(), x.dtype);
+    let empty =
+        |shape: Shape| empty_device_contiguous_dtype(client.clone(), device.clone(), shape, dtype);
+    let parts = empty([cells, PARTS, corners].into());
+    let sums = empty([cells, corners].into());
+    let element = dtype_to_storage_type(dtype);
+    let (count, threads) = launch(&parts);
     corner_sum::launch(
         &client,
         count,
@@ -31,12 +33,43 @@ pub(crate) fn corner_sums(x: CubeTensor, interpolation: &OnDevice) -> CubeTensor
         buffer(&interpolation.starts),
         buffer(&interpolation.entries),
         buffer(&interpolation.places),
-        sums.clone().into_buffer_arg(),
-        sums.shape().num_elements(),
+        parts.clone().into_buffer_arg(),
+        cells * PARTS * corners,
         interpolation.axes,
-        dtype,
+        element,
+    );
+    let (count, threads) = launch(&sums);
+    sum_of_parts::launch(
+        &client,
+        count,
+        threads,
+        parts.into_buffer_arg(),
+        sums.clone().into_buffer_arg(),
+        cells * corners,
+        corners,
+        element,
     );
     sums
+}
+
+#[cube(launch)]
+fn sum_of_parts<E: Float>(
+    parts: &[E],
+    sums: &mut [E],
+    len: usize,
+    #[comptime] corners: usize,
+    #[define(E)] _dtype: ElemType,
+) {
+    let place = ABSOLUTE_POS;
+    if place >= len {
+        terminate!();
+    }
+    let first = (place / corners) * PARTS * corners + place % corners;
+    let mut sum = E::new(0.0);
+    for part in 0..PARTS {
+        sum += parts[first + part * corners];
+    }
+    sums[place] = sum;
 }
 
 #[cube(launch)]
@@ -44,7 +77,7 @@ fn corner_sum<E: Float>(
     x: &[E],
     starts: &[i32],
     entries: &[i32],
-    places: &[f32],
+    places: &[E],
     sums: &mut [E],
     len: usize,
     #[comptime] axes: usize,
@@ -62,7 +95,7 @@ fn corner_sum<E: Float>(
     let mut sum = E::new(0.0);
     while sample < end {
         let entry = usize::cast_from(entries[sample]);
-        sum += x[entry] * E::cast_from(hat(places, sample, corner, axes));
+        sum += x[entry] * hat::<E>(places, sample, corner, axes);
         sample += PARTS;
     }
     sums[ABSOLUTE_POS] = sum;
@@ -99,7 +132,7 @@ fn add_interpolant<E: Float>(
     values: &[E],
     cells: &[i32],
     entries: &[i32],
-    places: &[f32],
+    places: &[E],
     len: usize,
     #[comptime] axes: usize,
     #[define(E)] _dtype: ElemType,
@@ -113,21 +146,21 @@ fn add_interpolant<E: Float>(
     let mut sum = E::new(0.0);
     #[unroll]
     for corner in 0..corners {
-        sum += values[first + corner] * E::cast_from(hat(places, sample, corner, axes));
+        sum += values[first + corner] * hat::<E>(places, sample, corner, axes);
     }
     z[usize::cast_from(entries[sample])] += sum;
 }
 
 /// The weight of a sample times the hat function of a corner of its cell.
 #[cube]
-fn hat(places: &[f32], sample: usize, corner: usize, #[comptime] axes: usize) -> f32 {
+fn hat<E: Float>(places: &[E], sample: usize, corner: usize, #[comptime] axes: usize) -> E {
     let first = sample * (axes + 1);
     let mut product = places[first];
     #[unroll]
     for axis in 0..axes {
         let place = places[first + 1 + axis];
         let upper = (corner >> axis) % 2 == 1;
-        product *= select(upper, place, 1.0f32 - place);
+        product *= select(upper, place, E::new(1.0) - place);
     }
     product
 }
