@@ -216,6 +216,11 @@ fn exponent(measured: &[Measured], name: &str) -> Option<f64> {
 
 /// Seconds and memory against `n`, a colour for each storage.
 fn figure(measured: &[Measured], steps: usize, device: &ComputeDevice) -> Figure {
+    let memory = if device.kind().is_cpu() {
+        "largest memory [MiB]"
+    } else {
+        "largest memory of the host [MiB]"
+    };
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
             let points: Vec<_> = surfaces(measured, storage, name).collect();
@@ -231,7 +236,7 @@ fn figure(measured: &[Measured], steps: usize, device: &ComputeDevice) -> Figure
     let title = measured.last().map_or("surface", |row| &row.title);
     Figure::new(format!("The {title} on the whole grid and on bricks"), 3)
         .with_panel(panel("time", "all steps [s]", "seconds"))
-        .with_panel(panel("memory", "largest memory [MiB]", "peak_mib"))
+        .with_panel(panel("memory", memory, "peak_mib"))
         .with_panel(panel("size", "stored cells", "active_cells"))
         .with_shared_legend()
         .with_note(format!(

@@ -15,16 +15,14 @@ pub fn exponent(points: &[[f64; 2]]) -> Option<f64> {
     (last[0] > first[0]).then(|| (last[1] / first[1]).ln() / (last[0] / first[0]).ln())
 }
 
-/// What computes, for a note below a figure.
+/// The device and the threads that compute, as a note below a figure says it.
 pub fn machine(device: &ComputeDevice) -> String {
     let threads = format!("{} threads", rayon::current_num_threads());
     if device.kind().is_cpu() {
         return threads;
     }
-    format!(
-        "{} and {threads} of the host, whose memory is shown",
-        device.kind()
-    )
+    let (kind, dtype) = (device.kind(), device.dtype());
+    format!("{kind} ({dtype:?}) and {threads} of the host")
 }
 
 /// The networks of the convergence tests at some resolutions, and that of surfaces.

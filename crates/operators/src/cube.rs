@@ -3,6 +3,7 @@
 use burn::backend::{Cube, tensor::FloatTensor};
 use burn::tensor::{DType, Element, Tensor, TensorData};
 use burn_backend::TensorMetadata;
+use burn_backend::ops::FloatTensorOps;
 
 use linearize::{CustomOpRegistry, ELEMENTWISE, Elementwise, Output};
 
@@ -64,7 +65,7 @@ impl GridOps for Cube {
                 })
             }
             Operation::Bricks(x, taps, neighbours, adjoint) => {
-                kernels::brick_convolution(x, taps, neighbours, adjoint)
+                kernels::brick_convolution(x, &taps, &neighbours, adjoint)
             }
             Operation::Tabulated(w, table, range, order) => {
                 kernels::tabulated(w, table, range, order)
@@ -75,7 +76,7 @@ impl GridOps for Cube {
 
 impl VectorOps for Cube {
     fn inner_product(a: CubeTensor, b: CubeTensor) -> CubeTensor {
-        ranked!(a.shape().num_dims(), 1 2 3 4, R => down((up::<R>(a) * up::<R>(b)).sum()))
+        Self::float_sum(kernels::partial_sums(a, Some(b)))
     }
 
     fn spectral_filter(x: CubeTensor, filter: SpectralFilter) -> CubeTensor {
@@ -100,13 +101,13 @@ impl VectorOps for Cube {
     fn update_on_host(x: CubeTensor, z: CubeTensor, update: SharedUpdate) -> CubeTensor {
         let device = ranked!(x.shape().num_dims(), 1 2 3 4, R => up::<R>(x.clone()).device());
         if let Some(interpolation) = update.on_device(&device, x.dtype()) {
-            let sums = up::<2>(kernels::corner_sums(x, &interpolation));
-            let shape = sums.dims();
-            let mut sums = read::<2, f64>(sums);
+            let (dtype, sums) = (x.dtype(), kernels::restricted(x, &interpolation));
+            let sums = up::<3>(sums).sum_dim(1);
+            let len = sums.shape().num_elements();
+            let mut sums = read::<3, f64>(sums);
             update.at_corners(&mut sums);
-            let values =
-                Tensor::<2>::from_data(TensorData::new(sums, shape), (&device, DType::F32));
-            return kernels::add_interpolated(z, down(values), &interpolation);
+            let values = Tensor::<1>::from_data(TensorData::new(sums, [len]), (&device, dtype));
+            return kernels::prolonged(z, down(values), &interpolation);
         }
         ranked!(x.shape().num_dims(), 1 2 3 4, R => {
             let (x, z) = (up::<R>(x), up::<R>(z));
@@ -140,7 +141,7 @@ fn read<const R: usize, T: Element>(x: Tensor<R>) -> Vec<T> {
     data.try_into_vec().expect("this precision was asked for")
 }
 
-/// Runs gathered elementwise operations of captured programs.
+/// Runs fused elementwise operations of captured programs.
 pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<Cube>) {
     registry.register(ELEMENTWISE, |handles, ir, _device| {
         let program = Elementwise::of(ir);
@@ -150,10 +151,11 @@ pub(crate) fn register_elementwise(registry: &mut CustomOpRegistry<Cube>) {
             .map(|x| handles.get_float_tensor::<Cube>(x));
         let results = kernels::elementwise(&program, inputs.collect());
         for ((result, output), out) in results.into_iter().zip(&program.outputs).zip(&ir.outputs) {
-            let result = ranked!(result.shape().num_dims(), 1 2 3 4, R => match output {
-                Output::Values(_) => down(up::<R>(result).cast(out.dtype)),
-                Output::Sum(_) => down(up::<R>(result).sum().cast(out.dtype)),
-            });
+            let result = match output {
+                Output::Values(_) => result,
+                Output::Sum(_) => Cube::float_sum(kernels::partial_sums(result, None)),
+            };
+            let result = Cube::float_cast(result, out.dtype.into());
             handles.register_float_tensor::<Cube>(&out.id, result);
         }
     });

@@ -162,8 +162,9 @@ impl ComputeDevice {
 
     /// A tensor with these values in the device's working precision, which may differ from Burn's default.
     pub fn tensor<const R: usize>(&self, values: &[f64], shape: [usize; R]) -> Tensor<R> {
-        let data = TensorData::new(values.to_vec(), shape);
-        Tensor::from_data(data, (&self.device, self.dtype))
+        // On CUDA the rows of what is uploaded are padded, which kernels would have to undo.
+        let data = TensorData::new(values.to_vec(), [values.len()]);
+        Tensor::<1>::from_data(data, (&self.device, self.dtype)).reshape(shape)
     }
 
     /// A tensor's values in double precision.

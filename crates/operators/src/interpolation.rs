@@ -10,23 +10,23 @@ pub struct Interpolation {
     pub axes: usize,
     /// The samples of cell `i` are those from `starts[i]` to `starts[i + 1]`.
     pub starts: Vec<u32>,
-    /// Which entry of the vector each sample is.
+    /// Which entry of the vector each sample is; none of them twice.
     pub entries: Vec<u32>,
     /// Of each sample its weight, and its place along each axis, from 0 to 1.
     pub places: Vec<f64>,
 }
 
 /// An [`Interpolation`] in the memory of a device, in the precision of its vectors.
-pub(crate) struct OnDevice {
+pub(crate) struct DeviceInterpolation {
     pub(crate) axes: usize,
     pub(crate) starts: Tensor<1, Int>,
     pub(crate) entries: Tensor<1, Int>,
     /// The cell of each sample.
-    pub(crate) cells: Tensor<1, Int>,
+    pub(crate) cell: Tensor<1, Int>,
     pub(crate) places: Tensor<1>,
 }
 
-impl OnDevice {
+impl DeviceInterpolation {
     pub(crate) fn new(interpolation: Interpolation, device: &Device, dtype: DType) -> Self {
         let Interpolation {
             axes,
@@ -49,8 +49,16 @@ impl OnDevice {
             axes,
             starts: whole(starts),
             entries: whole(entries),
-            cells: whole(cells),
+            cell: whole(cells),
             places: Tensor::from_data(TensorData::new(places, [count]), (device, dtype)),
         }
+    }
+
+    pub(crate) fn cells(&self) -> usize {
+        self.starts.dims()[0] - 1
+    }
+
+    pub(crate) fn samples(&self) -> usize {
+        self.entries.dims()[0]
     }
 }

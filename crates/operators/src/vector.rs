@@ -10,7 +10,7 @@ use burn::tensor::{DType, Device, Tensor};
 
 use crate::fft::{Real, is_f64, lock};
 use crate::filter::SpectralFilter;
-use crate::interpolation::{Interpolation, OnDevice};
+use crate::interpolation::{DeviceInterpolation, Interpolation};
 
 /// A change of one vector that depends on another and is computed on the host, such as a sparse correction.
 pub trait HostUpdate: Send + Sync {
@@ -23,8 +23,10 @@ pub trait HostUpdate: Send + Sync {
         None
     }
 
-    /// Then `S`: makes values at the corners of all cells of the sums there, cell by cell.
-    fn at_corners(&self, _sums: &mut [f64]) {}
+    /// Applies `S` where there is an interpolation: replaces the sums at the corners of each cell by the values there.
+    fn at_corners(&self, _sums: &mut [f64]) {
+        unreachable!("what has an interpolation has values at its corners");
+    }
 }
 
 /// A [`HostUpdate`] of any type.
@@ -59,7 +61,7 @@ impl<U: HostUpdate> AnyUpdate for U {
 pub struct SharedUpdate {
     update: Arc<dyn AnyUpdate>,
     /// Its interpolation where it ran last, if it has one.
-    on_device: Arc<Mutex<Option<(Device, DType, Arc<OnDevice>)>>>,
+    on_device: Arc<Mutex<Option<(Device, DType, Arc<DeviceInterpolation>)>>>,
 }
 
 impl SharedUpdate {
@@ -72,14 +74,22 @@ impl SharedUpdate {
     }
 
     /// Its interpolation, taken to the device in this precision the first time.
-    pub(crate) fn on_device(&self, device: &Device, dtype: DType) -> Option<Arc<OnDevice>> {
+    pub(crate) fn on_device(
+        &self,
+        device: &Device,
+        dtype: DType,
+    ) -> Option<Arc<DeviceInterpolation>> {
         let mut kept = lock(&self.on_device);
         if let Some((at, of, arrays)) = kept.as_ref()
             && (at, *of) == (device, dtype)
         {
             return Some(arrays.clone());
         }
-        let arrays = Arc::new(OnDevice::new(self.update.interpolation()?, device, dtype));
+        let arrays = Arc::new(DeviceInterpolation::new(
+            self.update.interpolation()?,
+            device,
+            dtype,
+        ));
         *kept = Some((device.clone(), dtype, arrays.clone()));
         Some(arrays)
     }

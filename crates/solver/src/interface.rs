@@ -336,6 +336,53 @@ mod tests {
         assert!(dot(&a, &za) >= 0.0 && dot(&b, &zb) >= 0.0);
     }
 
+    fn interpolation_case<const D: usize>(cells: usize) {
+        let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+        let ball = Ball::new([0.0; D], 0.3).unwrap();
+        let u = phase_field(grid, &ball, EPS).unwrap().into_values();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (1e-4, 1.0), None).unwrap();
+        let r: Vec<f64> = (0..u.len()).map(|i| (0.37 * i as f64).sin()).collect();
+        let (mut expected, mut found) = (r.clone(), r.clone());
+        modes.update(&r, &mut expected);
+
+        let lattice = modes.interpolation().unwrap();
+        let corners = 1 << D;
+        let hat = |sample: usize, corner: usize| -> f64 {
+            let places = &lattice.places[sample * (D + 1)..][..=D];
+            let along = |axis: usize| match corner >> axis & 1 {
+                1 => places[1 + axis],
+                _ => 1.0 - places[1 + axis],
+            };
+            places[0] * (0..D).map(along).product::<f64>()
+        };
+        let samples =
+            |cell: usize| lattice.starts[cell] as usize..lattice.starts[cell + 1] as usize;
+        let mut values = vec![0.0; (lattice.starts.len() - 1) * corners];
+        for (place, value) in values.iter_mut().enumerate() {
+            let terms = samples(place / corners);
+            let term = |i: usize| hat(i, place % corners) * r[lattice.entries[i] as usize];
+            *value = terms.map(term).sum();
+        }
+        modes.at_corners(&mut values);
+        for (cell, values) in values.chunks(corners).enumerate() {
+            for i in samples(cell) {
+                let terms = values.iter().enumerate();
+                let sum: f64 = terms.map(|(corner, value)| hat(i, corner) * value).sum();
+                found[lattice.entries[i] as usize] += sum;
+            }
+        }
+        let difference: Vec<f64> = found.iter().zip(&expected).map(|(a, b)| a - b).collect();
+        assert!(dot(&difference, &difference) < 1e-26 * dot(&expected, &expected));
+        assert!(expected != r);
+    }
+
+    /// What a GPU does of the correction, and what visits the host for it.
+    #[test]
+    fn the_correction_is_an_interpolation_and_its_transpose() {
+        interpolation_case::<2>(64);
+        interpolation_case::<3>(48);
+    }
+
     #[test]
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();

@@ -59,7 +59,11 @@ pub fn backends() -> Vec<Backend> {
     let first = backends.first().filter(|first| first.is_double());
     let single = first.and_then(|first| first.device.clone().with_dtype(DType::F32).ok());
     let gpus = backends.iter().filter(|backend| !backend.is_double());
-    let double = gpus.filter_map(|gpu| gpu.device.clone().with_dtype(DType::F64).ok());
+    let double = gpus.filter_map(|gpu| match gpu.device.clone().with_dtype(DType::F64) {
+        Ok(device) => Some(device),
+        Err(operators::Error::Unavailable { .. }) => None,
+        Err(error) => panic!("{error}"),
+    });
     let others: Vec<_> = single.into_iter().chain(double).collect();
     backends.extend(others.into_iter().map(Backend::new));
     backends

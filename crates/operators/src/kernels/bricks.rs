@@ -3,46 +3,42 @@
 
 use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
-use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use super::launch::{launch, like};
+use super::launch::{like, threads_for, values};
 
 /// See [`crate::brick_convolution`]: one launch for each axis.
 pub(crate) fn brick_convolution(
-    x: CubeTensor,
-    taps: CubeTensor,
-    neighbours: CubeTensor,
+    mut x: CubeTensor,
+    taps: &CubeTensor,
+    neighbours: &CubeTensor,
     adjoint: bool,
 ) -> CubeTensor {
     let shape = x.shape();
     let (axes, side) = (shape.num_dims(), shape[shape.num_dims() - 1]);
-    let [mut x, taps, neighbours] = [x, taps, neighbours].map(into_contiguous);
     for pass in 0..axes {
         let axis = if adjoint { pass } else { axes - 1 - pass };
         let result = like(&x);
-        let (count, threads) = launch(&x);
-        let dtype = dtype_to_storage_type(x.dtype);
-        let width = taps.shape()[0];
-        let client = x.client.clone();
+        let (client, dtype) = (x.client.clone(), x.dtype);
+        let (count, threads) = threads_for(&client, shape.num_elements());
         brick_pass::launch(
             &client,
             count,
             threads,
-            x.into_buffer_arg(),
-            taps.clone().into_buffer_arg(),
-            neighbours.clone().into_buffer_arg(),
-            result.clone().into_buffer_arg(),
+            values(x, dtype),
+            values(taps.clone(), dtype),
+            values(neighbours.clone(), dtype),
+            values(result.clone(), dtype),
             shape.num_elements(),
             side.pow((axes - 1 - axis) as u32),
             2 * axis,
             2 * axes,
             side,
             side.pow(axes as u32),
-            width,
+            taps.shape()[0],
             adjoint,
-            dtype,
+            dtype_to_storage_type(dtype),
         );
         x = result;
     }

@@ -1,75 +1,42 @@
-//! Interpolation between the corners of lattice cells, and its transpose.
+//! The transpose of an interpolation between the corners of lattice cells, and that interpolation.
 #![expect(clippy::used_underscore_binding, reason = "the macro does it")]
 
-use burn_backend::Shape;
+use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use super::launch::{buffer, launch, primitive};
-use crate::interpolation::OnDevice;
+use super::launch::{numbers, threads_for, values};
+use crate::interpolation::DeviceInterpolation;
 
-/// Samples of a cell are summed in so many parts.
+/// For each corner of a cell, this many threads sum its samples.
 const PARTS: usize = 16;
 
-/// `Z^T x` before cells that share a corner are added up: `[cells, 2^axes]`.
-pub(crate) fn corner_sums(x: CubeTensor, interpolation: &OnDevice) -> CubeTensor {
-    let x = into_contiguous(x);
-    let (cells, corners) = (interpolation.starts.dims()[0] - 1, 1 << interpolation.axes);
-    let (client, device, dtype) = (x.client.clone(), x.device.clone(), x.dtype);
-    let empty =
-        |shape: Shape| empty_device_contiguous_dtype(client.clone(), device.clone(), shape, dtype);
-    let parts = empty([cells, PARTS, corners].into());
-    let sums = empty([cells, corners].into());
-    let element = dtype_to_storage_type(dtype);
-    let (count, threads) = launch(&parts);
+/// `Z^T x` before cells that share a corner are added up: `[cells, parts, 2^axes]`, to be summed over the parts.
+pub(crate) fn restricted(x: CubeTensor, interpolation: &DeviceInterpolation) -> CubeTensor {
+    let (cells, corners) = (interpolation.cells(), 1 << interpolation.axes);
+    let (client, dtype) = (x.client.clone(), x.dtype);
+    let shape = [cells, PARTS, corners];
+    let parts =
+        empty_device_contiguous_dtype(client.clone(), x.device.clone(), shape.into(), dtype);
+    let len = shape.iter().product();
+    let (count, threads) = threads_for(&client, len);
     corner_sum::launch(
         &client,
         count,
         threads,
-        x.into_buffer_arg(),
-        buffer(&interpolation.starts),
-        buffer(&interpolation.entries),
-        buffer(&interpolation.places),
-        parts.clone().into_buffer_arg(),
-        cells * PARTS * corners,
+        values(x, dtype),
+        numbers(&interpolation.starts),
+        numbers(&interpolation.entries),
+        numbers(&interpolation.places),
+        values(parts.clone(), dtype),
+        len,
         interpolation.axes,
-        element,
+        dtype_to_storage_type(dtype),
     );
-    let (count, threads) = launch(&sums);
-    sum_of_parts::launch(
-        &client,
-        count,
-        threads,
-        parts.into_buffer_arg(),
-        sums.clone().into_buffer_arg(),
-        cells * corners,
-        corners,
-        element,
-    );
-    sums
-}
-
-#[cube(launch)]
-fn sum_of_parts<E: Float>(
-    parts: &[E],
-    sums: &mut [E],
-    len: usize,
-    #[comptime] corners: usize,
-    #[define(E)] _dtype: ElemType,
-) {
-    let place = ABSOLUTE_POS;
-    if place >= len {
-        terminate!();
-    }
-    let first = (place / corners) * PARTS * corners + place % corners;
-    let mut sum = E::new(0.0);
-    for part in 0..PARTS {
-        sum += parts[first + part * corners];
-    }
-    sums[place] = sum;
+    parts
 }
 
 #[cube(launch)]
@@ -101,27 +68,27 @@ fn corner_sum<E: Float>(
     sums[ABSOLUTE_POS] = sum;
 }
 
-/// `z + Z v` for values at the corners of all cells.
-pub(crate) fn add_interpolated(
+/// `z + Z v` for the values `v` at the corners of all cells.
+pub(crate) fn prolonged(
     z: CubeTensor,
-    values: CubeTensor,
-    interpolation: &OnDevice,
+    at_corners: CubeTensor,
+    interpolation: &DeviceInterpolation,
 ) -> CubeTensor {
     let z = into_contiguous(if z.can_mut() { z } else { z.copy() });
-    let (count, threads) = launch(&primitive(&interpolation.entries));
-    let dtype = dtype_to_storage_type(z.dtype);
+    let (samples, dtype) = (interpolation.samples(), z.dtype());
+    let (count, threads) = threads_for(&z.client, samples);
     add_interpolant::launch(
         &z.client,
         count,
         threads,
-        z.clone().into_buffer_arg(),
-        values.into_buffer_arg(),
-        buffer(&interpolation.cells),
-        buffer(&interpolation.entries),
-        buffer(&interpolation.places),
-        interpolation.entries.dims()[0],
+        values(z.clone(), dtype),
+        values(at_corners, dtype),
+        numbers(&interpolation.cell),
+        numbers(&interpolation.entries),
+        numbers(&interpolation.places),
+        samples,
         interpolation.axes,
-        dtype,
+        dtype_to_storage_type(dtype),
     );
     z
 }

@@ -1,4 +1,4 @@
-//! Gathered elementwise operations.
+//! Fused elementwise operations.
 #![expect(clippy::used_underscore_binding, reason = "the macro does it")]
 #![expect(
     clippy::needless_pass_by_value,
@@ -7,14 +7,13 @@
 
 use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
-use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 use linearize::{Arithmetic, Elementwise, Output, Right};
 
-use super::launch::{launch, like};
+use super::launch::{like, threads_for, values};
 
-/// What a kernel is compiled for. Numbers in the program may change.
+/// A kernel is compiled once for each of these; the numbers of a program are arguments.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Form {
     /// For every input, whether its one value stands for all entries.
@@ -72,21 +71,27 @@ pub(crate) fn elementwise(program: &Elementwise, inputs: Vec<CubeTensor>) -> Vec
     let longest = inputs.iter().max_by_key(|x| len(x));
     let longest = longest.expect("a program has inputs").clone();
     let (form, numbers) = Form::of(program, inputs.iter().map(|x| len(x) == 1).collect());
+    let (client, dtype) = (&longest.client, longest.dtype);
+    let bindings = client.properties().hardware.max_bindings as usize;
+    assert!(
+        inputs.len() + form.outputs.len() < bindings,
+        "the device takes {bindings} buffers"
+    );
     let results: Vec<_> = form.outputs.iter().map(|_| like(&longest)).collect();
-    let dtype = dtype_to_storage_type(longest.dtype);
+    let element = dtype_to_storage_type(dtype);
     let (mut from, mut to, mut with) = (SequenceArg::new(), SequenceArg::new(), SequenceArg::new());
     for x in inputs {
-        from.push(into_contiguous(x).into_buffer_arg());
+        from.push(values(x, dtype));
     }
     for x in &results {
-        to.push(x.clone().into_buffer_arg());
+        to.push(values(x.clone(), dtype));
     }
     for number in numbers {
-        with.push(InputScalar::new(number, dtype));
+        with.push(InputScalar::new(number, element));
     }
-    let (count, threads) = launch(&longest);
+    let (count, threads) = threads_for(client, len(&longest));
     entrywise::launch(
-        &longest.client,
+        client,
         count,
         threads,
         from,
@@ -94,7 +99,7 @@ pub(crate) fn elementwise(program: &Elementwise, inputs: Vec<CubeTensor>) -> Vec
         with,
         len(&longest),
         form,
-        dtype,
+        element,
     );
     results
 }
@@ -113,31 +118,31 @@ fn entrywise<E: Float>(
         terminate!();
     }
     // The operands so far.
-    let mut values = Sequence::<E>::new();
+    let mut operands = Sequence::<E>::new();
     #[unroll]
     for i in 0..comptime!(form.single.len()) {
         let input = inputs.index(i);
         if comptime!(form.single[i]) {
-            values.push(input[0]);
+            operands.push(input[0]);
         } else {
-            values.push(input[entry]);
+            operands.push(input[entry]);
         }
     }
     #[unroll]
     for i in 0..comptime!(form.steps.len()) {
         let step = comptime!(form.steps[i]);
-        let left = *values.index(comptime!(step.left));
+        let left = *operands.index(comptime!(step.left));
         let right = if comptime!(step.by_number) {
             numbers.index(comptime!(step.right)).get::<E>()
         } else {
-            *values.index(comptime!(step.right))
+            *operands.index(comptime!(step.right))
         };
-        values.push(computed::<E>(left, right, comptime!(step.arithmetic)));
+        operands.push(computed::<E>(left, right, comptime!(step.arithmetic)));
     }
     #[unroll]
     for i in 0..comptime!(form.outputs.len()) {
         let result = results.index_mut(i);
-        result[entry] = *values.index(comptime!(form.outputs[i]));
+        result[entry] = *operands.index(comptime!(form.outputs[i]));
     }
 }
 

@@ -1,8 +1,9 @@
 //! What all kernels are launched with.
 
 use burn::backend::Cube;
-use burn::tensor::{BackendPrimitive, Tensor, kind::Basic};
+use burn::tensor::{BackendPrimitive, DType, Tensor, kind::Basic};
 use burn_backend::TensorMetadata;
+use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::calculate_cube_count_elemwise;
@@ -14,27 +15,27 @@ pub(super) fn like(x: &CubeTensor) -> CubeTensor {
     empty_device_contiguous_dtype(client, device, x.shape(), x.dtype)
 }
 
-pub(super) fn primitive<K>(x: &Tensor<1, K>) -> CubeTensor
+/// Values in the order of their indices, in the precision of a kernel: in another one it would read beyond their memory.
+pub(super) fn values(x: CubeTensor, dtype: DType) -> BufferArg {
+    assert_eq!(x.dtype, dtype, "a kernel has one precision");
+    into_contiguous(x).into_buffer_arg()
+}
+
+/// Numbers that were uploaded as such.
+pub(super) fn numbers<K>(x: &Tensor<1, K>) -> BufferArg
 where
     K: Basic + BackendPrimitive<Cube, Primitive = CubeTensor>,
 {
     let x = x.clone().try_into_primitive::<Cube>();
-    x.expect("it is on the device of the vectors")
+    into_contiguous(x.expect("it is on the device of the vectors")).into_buffer_arg()
 }
 
-pub(super) fn buffer<K>(x: &Tensor<1, K>) -> BufferArg
-where
-    K: Basic + BackendPrimitive<Cube, Primitive = CubeTensor>,
-{
-    primitive(x).into_buffer_arg()
-}
-
-/// A thread for every value.
-pub(super) fn launch(x: &CubeTensor) -> (CubeCount, CubeDim) {
-    let values = x.shape().num_elements();
-    let threads = CubeDim::new(&x.client, values);
+/// Cubes of threads, a thread for each of so many values.
+pub(super) fn threads_for(client: &Client, values: usize) -> (CubeCount, CubeDim) {
+    assert!(u32::try_from(values).is_ok(), "kernels count in 32 bits");
+    let threads = CubeDim::new(client, values);
     (
-        calculate_cube_count_elemwise(&x.client, values, threads),
+        calculate_cube_count_elemwise(client, values, threads),
         threads,
     )
 }

@@ -3,11 +3,10 @@
 
 use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
-use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use super::launch::{launch, like};
+use super::launch::{like, threads_for, values};
 use crate::table::{COEFFICIENTS, TableRange, factor};
 
 /// See [`crate::tabulated`].
@@ -17,24 +16,23 @@ pub(crate) fn tabulated(
     range: TableRange,
     order: usize,
 ) -> CubeTensor {
-    let [w, table] = [w, table].map(into_contiguous);
     let result = like(&w);
-    let (count, threads) = launch(&w);
-    let dtype = dtype_to_storage_type(w.dtype);
-    let client = w.client.clone();
+    let (client, dtype, len) = (w.client.clone(), w.dtype, w.shape().num_elements());
+    let element = dtype_to_storage_type(dtype);
+    let (count, threads) = threads_for(&client, len);
     table_value::launch(
         &client,
         count,
         threads,
-        w.into_buffer_arg(),
-        table.into_buffer_arg(),
-        result.clone().into_buffer_arg(),
-        result.shape().num_elements(),
-        InputScalar::new(range.low, dtype),
-        InputScalar::new(range.width(), dtype),
+        values(w, dtype),
+        values(table, dtype),
+        values(result.clone(), dtype),
+        len,
+        InputScalar::new(range.low, element),
+        InputScalar::new(range.width(), element),
         range.cells,
         order,
-        dtype,
+        element,
     );
     result
 }

@@ -3,11 +3,10 @@
 
 use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
-use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
-use super::launch::{launch, like};
+use super::launch::{like, threads_for, values};
 
 /// Real and imaginary part.
 type Parts = (CubeTensor, CubeTensor);
@@ -15,8 +14,9 @@ type Parts = (CubeTensor, CubeTensor);
 /// The Fourier transform along one axis, not normalised; an imaginary part that is absent is zero, and `roots` are those of unity, `cos` and then
 /// `sin`.
 ///
-/// With `n = a b` and `k = p + a q` it is `sum_j w^(j p) w^(j q a) sum_i x_(i b + j) w^(i p b)`, `w = exp(-2 pi i / n)`: sums of `a` and then of
-/// `b` terms instead of `n`, whatever `n` is, and of `n` terms where it is prime.
+/// It is one step of Cooley and Tukey. With `n = a b`, where `a` is the largest divisor up to `sqrt n`, and `k = p + a q` the transform is
+/// `sum_j w^(j p) w^(j q a) sum_i x_(i b + j) w^(i p b)`, `w = exp(-2 pi i / n)`: inner sums of `a` terms and outer ones of `b`. Where `n` is prime,
+/// there is one sum of `n` terms.
 pub(crate) fn transform(
     re: CubeTensor,
     im: Option<CubeTensor>,
@@ -25,10 +25,9 @@ pub(crate) fn transform(
     inverse: bool,
 ) -> Parts {
     let n = re.shape()[axis];
-    let a = (1..=n.isqrt())
-        .rev()
-        .find(|a| n.is_multiple_of(*a))
-        .unwrap_or(1);
+    let divisors = (1..=n.isqrt()).rev();
+    let a = divisors.into_iter().find(|a| n.is_multiple_of(*a));
+    let a = a.unwrap_or(1);
     if a == 1 {
         return sums((re, im), roots, axis, (1, n), false, inverse);
     }
@@ -46,22 +45,19 @@ fn sums(
     inverse: bool,
 ) -> Parts {
     let real = im.is_none();
-    let re = into_contiguous(re);
-    let im = im.map_or_else(|| re.clone(), into_contiguous);
+    let im = im.unwrap_or_else(|| re.clone());
     let (of_re, of_im) = (like(&re), like(&re));
-    let (count, threads) = launch(&re);
-    let dtype = dtype_to_storage_type(re.dtype);
-    let shape = re.shape();
-    let client = re.client.clone();
+    let (client, dtype, shape) = (re.client.clone(), re.dtype, re.shape());
+    let (count, threads) = threads_for(&client, shape.num_elements());
     transform_sum::launch(
         &client,
         count,
         threads,
-        re.into_buffer_arg(),
-        im.into_buffer_arg(),
-        roots.clone().into_buffer_arg(),
-        of_re.clone().into_buffer_arg(),
-        of_im.clone().into_buffer_arg(),
+        values(re, dtype),
+        values(im, dtype),
+        values(roots.clone(), dtype),
+        values(of_re.clone(), dtype),
+        values(of_im.clone(), dtype),
         shape.num_elements(),
         a,
         b,
@@ -69,7 +65,7 @@ fn sums(
         inner,
         real,
         inverse,
-        dtype,
+        dtype_to_storage_type(dtype),
     );
     (of_re, of_im)
 }
@@ -97,42 +93,41 @@ fn transform_sum<E: Float>(
     let n = a * b;
     let along = (place / stride) % n;
     let line = place - along * stride;
-    // Of the outer sums: where the first term is and how far apart they are, which root it has and by how much the next one is further, and
-    // how many terms there are.
-    let mut at = line + (along % a) * b * stride;
-    let mut step = stride;
-    let mut turn = 0usize;
-    let mut turns = (along / a) * a;
+    // The outer sums: the index of the first term and how far the next one is, the root of the first one and how far the next one is.
+    let mut index = line + (along % a) * b * stride;
+    let mut index_step = stride;
+    let mut root = 0usize;
+    let mut root_step = (along / a) * a;
     let mut terms = b;
     if comptime!(inner) {
         let p = along / b;
         let j = along % b;
-        at = line + j * stride;
-        step = b * stride;
-        turn = (j * p) % n;
-        turns = p * b;
+        index = line + j * stride;
+        index_step = b * stride;
+        root = (j * p) % n;
+        root_step = p * b;
         terms = a;
     }
     let mut sum_re = E::new(0.0);
     let mut sum_im = E::new(0.0);
     for _ in 0..terms {
-        let cos = roots[turn];
-        let mut sin = roots[n + turn];
+        let cos = roots[root];
+        let mut sin = roots[n + root];
         // exp(-i t) forward, exp(i t) backward.
         if comptime!(inverse) {
             sin = E::new(0.0) - sin;
         }
-        let x = re[at];
+        let x = re[index];
         sum_re += x * cos;
         sum_im -= x * sin;
         if comptime!(!real) {
-            let y = im[at];
+            let y = im[index];
             sum_re += y * sin;
             sum_im += y * cos;
         }
-        turn += turns;
-        turn = select(turn >= n, turn - n, turn);
-        at += step;
+        root += root_step;
+        root = select(root >= n, root - n, root);
+        index += index_step;
     }
     of_re[place] = sum_re;
     of_im[place] = sum_im;
