@@ -2,22 +2,15 @@
 
 #![allow(missing_docs, reason = "messages and names say it")]
 
-use std::path::PathBuf;
-
 /// Errors of pages and what they are made of, each saying which file or number is at fault.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        path: PathBuf,
-        source: std::io::Error,
-    },
     #[error("{0} is missing")]
     Missing(String),
-    /// A page that cannot be written.
-    Write(#[from] files::Error),
+    /// A file that cannot be read, or a page that cannot be written.
+    File(#[from] files::Error),
     #[error("{name} is no intact PNG or SVG picture: {problem}")]
     Picture { name: String, problem: String },
     /// A view that cannot be taken.

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
@@ -145,10 +145,7 @@ fn kept<T>(result: Result<T>, problems: &mut Vec<Error>) -> Option<T> {
 
 /// Names of the files in a folder, or of the folders, without hidden ones, in natural order.
 fn entries(folder: &Path, folders: bool) -> Result<Vec<String>> {
-    let failed = |source| Error::Read {
-        path: folder.into(),
-        source,
-    };
+    let failed = |source| files::Error::of("read", folder)(source);
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
@@ -166,10 +163,7 @@ fn entries(folder: &Path, folders: bool) -> Result<Vec<String>> {
 
 /// A file, with errors that do not say where the page is made.
 fn read_bytes(root: &Path, file: &str) -> Result<Vec<u8>> {
-    fs::read(root.join(file)).map_err(|source| Error::Read {
-        path: PathBuf::from(file),
-        source,
-    })
+    Ok(fs::read(root.join(file)).map_err(files::Error::of("read", file))?)
 }
 
 fn read(root: &Path, file: &str) -> Result<String> {
