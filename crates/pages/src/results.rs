@@ -94,9 +94,10 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
     let known = entry.map_or(&[][..], |entry| &entry.figures).iter();
     let known = known.map(|(stem, caption)| (format!("{stem}.png"), caption.clone()));
     let mut pictures: Vec<(String, String)> = known.collect();
-    for file in files.iter().filter(|file| extension_of(file) == "png") {
-        if pictures.iter().all(|(other, _)| other != file) {
-            pictures.push((file.clone(), format!("{}.", spelled_out(stem_of(file)))));
+    for file in &files {
+        let (stem, extension) = stem_and_extension(file);
+        if extension == "png" && pictures.iter().all(|(other, _)| other != file) {
+            pictures.push((file.clone(), format!("{}.", spelled_out(stem))));
         }
     }
     for (file, caption) in pictures {
@@ -107,24 +108,25 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
         }
     }
     let mut folded = Vec::new();
-    for (file, marked) in tables(&files) {
-        let caption = spelled_out(stem_of(file));
-        let table = read(root, &path(file)).and_then(|text| {
-            if marked {
-                Table::from_markdown(path(file), &text)
-            } else {
-                Table::from_csv(path(file), &text)
-            }
-        });
+    for file in &files {
+        let (stem, extension) = stem_and_extension(file);
+        // Tables in Markdown, and those in CSV that are not there in Markdown.
+        let decode: fn(String, &str) -> Result<Table> = match extension {
+            "md" if file != "README.md" => Table::from_markdown,
+            "csv" if !files.contains(&format!("{stem}.md")) => Table::from_csv,
+            _ => continue,
+        };
+        let table = read(root, &path(file)).and_then(|text| decode(path(file), &text));
         let Some(mut table) = kept(table, problems) else {
             continue;
         };
-        table.caption.clone_from(&caption);
-        let rows = table.rows().len();
+        table.caption = spelled_out(stem);
+        let (rows, marked) = (table.rows().len(), extension == "md");
         if marked && rows <= LONGEST_OPEN_TABLE {
             section.push(table);
         } else if marked || rows <= LONGEST_CSV {
-            folded.push(Section::new(format!("{caption} ({rows} rows)")).with(table));
+            let title = format!("{} ({rows} rows)", table.caption);
+            folded.push(Section::new(title).with(table));
         }
     }
     let summary = path("summary.json");
@@ -227,24 +229,8 @@ fn without_title(text: &str) -> &str {
     }
 }
 
-/// Tables in Markdown, and those in CSV that are not there in Markdown.
-fn tables(files: &[String]) -> impl Iterator<Item = (&str, bool)> {
-    let has = |file: String| files.contains(&file);
-    files
-        .iter()
-        .filter_map(move |file| match extension_of(file) {
-            "md" if file != "README.md" => Some((file.as_str(), true)),
-            "csv" if !has(format!("{}.md", stem_of(file))) => Some((file.as_str(), false)),
-            _ => None,
-        })
-}
-
-fn extension_of(file: &str) -> &str {
-    file.rsplit_once('.').map_or("", |(_, extension)| extension)
-}
-
-fn stem_of(file: &str) -> &str {
-    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
+fn stem_and_extension(file: &str) -> (&str, &str) {
+    file.rsplit_once('.').unwrap_or((file, ""))
 }
 
 /// `Error over radius` of `error_over_radius`.
