@@ -13,7 +13,7 @@ use crate::light::Lights;
 use crate::model::{Model, Tube};
 use crate::picture::{Picture, checked_size};
 use crate::raster::Triangle;
-use crate::shadow::{Effort, arriving};
+use crate::shadow::arriving;
 
 /// Rows of a picture drawn at once.
 const BAND: usize = 8;
@@ -29,16 +29,12 @@ pub enum Quality {
 }
 
 impl Quality {
-    fn effort(self) -> Effort {
-        let [sky, key, pixels, samples] = match self {
+    /// Numbers of directions to the surroundings and into the key light, pixels a side of a shadow map, and samples of a pixel of the
+    /// picture along each axis.
+    fn effort(self) -> [usize; 4] {
+        match self {
             Self::Draft => [64, 8, 160, 3],
             Self::Standard => [160, 24, 400, 4],
-        };
-        Effort {
-            sky,
-            key,
-            pixels,
-            samples,
         }
     }
 }
@@ -151,12 +147,11 @@ impl Scene {
             model.push(tube, index, colours.len())?;
             colours.push(tube.colour.linear());
         }
-        let effort = self.quality.effort();
-        let per_side = effort.samples;
+        let [sky, key, map_side, per_side] = self.quality.effort();
         let camera = self.camera(&model, size.map(|side| per_side as u32 * side))?;
         let lights = Lights::new(&self.view.orientation()?);
         let drawing = Drawing {
-            arriving: arriving(&model, &lights, effort),
+            arriving: arriving(&model, &lights, [sky, key], map_side),
             triangles: (model.triangles.iter())
                 .map(|corners| corners.map(|v| camera.project(model.vertices[v as usize].place)))
                 .map(Triangle::new)

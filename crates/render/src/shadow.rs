@@ -17,19 +17,14 @@ const AT_ONCE: usize = 16;
 /// Lookups start this far from the surface, in pixels of a map.
 const OFFSET: f64 = 0.75;
 
-/// Numbers of directions to the surroundings and into the key light, pixels a side of a map, and samples of a pixel of the picture along
-/// each axis.
-#[derive(Clone, Copy)]
-pub(crate) struct Effort {
-    pub sky: usize,
-    pub key: usize,
-    pub pixels: usize,
-    pub samples: usize,
-}
-
 /// For every vertex the visible part of the key light and the arriving part of the surroundings'
-/// light, from 0 to 1.
-pub(crate) fn arriving(model: &Model, lights: &Lights, effort: Effort) -> Vec<[f64; 2]> {
+/// light, from 0 to 1, given the numbers of directions to look in and the pixels a side of a map.
+pub(crate) fn arriving(
+    model: &Model,
+    lights: &Lights,
+    [sky, key]: [usize; 2],
+    map_side: usize,
+) -> Vec<[f64; 2]> {
     let places = || model.vertices.iter().map(|vertex| vertex.place);
     let low = places().fold(DVec3::INFINITY, DVec3::min);
     let high = places().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -40,7 +35,7 @@ pub(crate) fn arriving(model: &Model, lights: &Lights, effort: Effort) -> Vec<[f
         for directions in directions.chunks(AT_ONCE) {
             let maps: Vec<Map> = directions
                 .par_iter()
-                .map(|&towards| Map::new(model, centre, radius, towards, effort.pixels))
+                .map(|&towards| Map::new(model, centre, radius, towards, map_side))
                 .collect();
             let vertices = sums.par_iter_mut().zip(&model.vertices);
             vertices.for_each(|([lit, all], vertex)| {
@@ -57,12 +52,11 @@ pub(crate) fn arriving(model: &Model, lights: &Lights, effort: Effort) -> Vec<[f
             .map(|[lit, all]| if all > 0.0 { lit / all } else { 0.0 })
             .collect::<Vec<f64>>()
     };
-    let cosine = |normal: DVec3, towards: DVec3| normal.dot(towards).max(0.0);
-    let key = parts(&lights.towards_key(effort.key), &|n, d| {
+    let key = parts(&lights.towards_key(key), &|n, d| {
         f64::from(u8::from(n.dot(d) > 0.0))
     });
-    let sky = parts(&all_around(effort.sky), &|n, d| {
-        cosine(n, d) * lights.radiance(d)
+    let sky = parts(&all_around(sky), &|n, d| {
+        n.dot(d).max(0.0) * lights.radiance(d)
     });
     key.into_iter()
         .zip(sky)
