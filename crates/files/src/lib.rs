@@ -31,6 +31,6 @@ pub use atomic::{
 };
 pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
-pub use number::{Number, unsigned};
+pub use number::Number;
 pub use storage::{Disk, Storage};
 pub use text::{shortened, with_causes};

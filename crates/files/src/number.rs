@@ -34,7 +34,12 @@ impl Number {
 
     /// The value of as many bytes as it has.
     pub fn decode(self, bytes: &[u8], big_endian: bool) -> f64 {
-        let bits = unsigned(bytes, big_endian);
+        let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        let bits = if big_endian {
+            bytes.iter().fold(0, push)
+        } else {
+            bytes.iter().rev().fold(0, push)
+        };
         match self {
             Self::U8 | Self::U16 | Self::U32 | Self::U64 => bits as f64,
             Self::I8 => f64::from(bits as i8),
@@ -44,15 +49,5 @@ impl Number {
             Self::F32 => f64::from(f32::from_bits(bits as u32)),
             Self::F64 => f64::from_bits(bits),
         }
-    }
-}
-
-/// The unsigned number in at most eight bytes.
-pub fn unsigned(bytes: &[u8], big_endian: bool) -> u64 {
-    let push = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
-    if big_endian {
-        bytes.iter().fold(0, push)
-    } else {
-        bytes.iter().rev().fold(0, push)
     }
 }
