@@ -19,7 +19,7 @@ pub struct Polyline {
 
 impl Polyline {
     /// The segments, including the closing one.
-    pub fn segments(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+    pub fn segments(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + Clone + '_ {
         let closing = if self.closed {
             self.points.first()
         } else {

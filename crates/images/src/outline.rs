@@ -123,17 +123,14 @@ impl Outline {
 
     /// The middle of each segment with its outward normal and its length.
     pub fn sides(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], f64)> + Clone {
-        self.curves.iter().flat_map(|curve| {
-            let ends = curve.points.iter().skip(1).chain(&curve.points[..1]);
-            let pairs = curve.points.iter().zip(ends);
-            let sides = pairs.map(|(a, b)| {
-                let along = [b[0] - a[0], b[1] - a[1]];
-                let length = along[0].hypot(along[1]);
-                let normal = [along[1], -along[0]].map(|x| x / length);
-                ([0, 1].map(|i| 0.5 * (a[i] + b[i])), normal, length)
-            });
-            sides.filter(|(_, _, length)| *length > 0.0)
-        })
+        let segments = self.curves.iter().flat_map(Polyline::segments);
+        let sides = segments.map(|(a, b)| {
+            let along = [b[0] - a[0], b[1] - a[1]];
+            let length = along[0].hypot(along[1]);
+            let normal = [along[1], -along[0]].map(|x| x / length);
+            ([0, 1].map(|i| 0.5 * (a[i] + b[i])), normal, length)
+        });
+        sides.filter(|(_, _, length)| *length > 0.0)
     }
 
     /// The enclosed area, less that of the holes.
