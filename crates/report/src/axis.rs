@@ -64,22 +64,23 @@ impl Axis {
         let Some((low, high)) = shown.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else {
             return Ok(None);
         };
+        // What is as good as constant is shown in the middle of a range of its own size, which needs some padding.
+        let around = if padding > 0.0 { padding } else { 0.05 };
         let (low, high) = match self.scale {
             Scale::Linear => {
-                let span = match high - low {
-                    span if span > narrowest(low, high) => span,
-                    // As good as constant: show it in the middle of a range of its own size.
-                    _ if high.abs() < 1e-250 => 1.0,
-                    _ => high.abs(),
+                let added = match high - low {
+                    span if span > narrowest(low, high) => padding * span,
+                    _ if high.abs() < 1e-250 => around,
+                    _ => around * high.abs(),
                 };
-                (low - padding * span, high + padding * span)
+                (low - added, high + added)
             }
             Scale::Log => {
-                let span = match high.log10() - low.log10() {
-                    span if span > 1e-9 => span,
-                    _ => 1.0,
+                let added = match high.log10() - low.log10() {
+                    span if span > 1e-9 => padding * span,
+                    _ => around,
                 };
-                let factor = 10.0_f64.powf(padding * span);
+                let factor = 10.0_f64.powf(added);
                 let low = (low / factor).max(f64::MIN_POSITIVE);
                 (low, (high * factor).min(f64::MAX))
             }
@@ -189,7 +190,7 @@ impl Ticks {
 }
 
 /// Ranges up to this width cannot be told from a point: their ticks would drown in rounding.
-pub(crate) fn narrowest(low: f64, high: f64) -> f64 {
+fn narrowest(low: f64, high: f64) -> f64 {
     1e-12 * low.abs().max(high.abs()) + 1e-280
 }
 

@@ -3,7 +3,7 @@
 use srgb::Rgb;
 
 use crate::axes::{Axes, Ruler};
-use crate::axis::{Axis, Window, narrowest};
+use crate::axis::{Axis, Window};
 use crate::colour::{FRAME, viridis};
 use crate::drawable::Drawable;
 use crate::error::{Error, Result};
@@ -46,13 +46,7 @@ impl Heatmap {
 
     pub(crate) fn checked(&self, fonts: Fonts) -> Result<Coloured<'_>> {
         Error::check_shape(&self.title, self.shape, self.values.len())?;
-        let mut values = self.values.iter().copied().filter(|&v| self.bar.shows(v));
-        let first = values.next();
-        // Up to rounding.
-        let near = |a: f64, b: f64| (a - b).abs() <= narrowest(a.min(b), a.max(b));
-        let constant = values.all(|v| first.is_some_and(|first| near(v, first)));
-        let padding = if constant { 0.05 } else { 0.0 };
-        let colours = self.bar.resolve(self.values.iter().copied(), padding)?;
+        let colours = self.bar.resolve(self.values.iter().copied(), 0.0)?;
         let colours = colours.ok_or_else(|| Error::Empty(self.title.clone()))?;
         let bar = Ruler::new(&self.bar, colours, fonts);
         let ends = [&self.x, &self.y].map(|axis| axis.range.unwrap_or([0.0, 1.0]));
