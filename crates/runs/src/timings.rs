@@ -28,7 +28,12 @@ pub(crate) fn encode(seconds: &[f64]) -> Result<String, Error> {
 
 pub(crate) fn read(folder: &Path) -> Result<Vec<f64>, Error> {
     let path = folder.join(names::TIMINGS);
-    unseal(&digest::read(&path)?).ok_or_else(|| digest::wrong_checksum(&path))
+    let bytes = digest::read(&path)?;
+    match serde_json::from_slice(&bytes) {
+        // There is one text for every content, so that a change anywhere is noticed.
+        Ok(Sealed { content }) if seal(&content.seconds).as_bytes() == bytes => Ok(content.seconds),
+        _ => Err(digest::wrong_checksum(&path)),
+    }
 }
 
 fn seal(seconds: &[f64]) -> String {
@@ -36,11 +41,4 @@ fn seal(seconds: &[f64]) -> String {
     let content = content.expect("it is numbers").replace('\n', "\n  ");
     let sha256 = hexadecimal(Sha256::of(&content));
     format!("{{\n  \"sha256\": \"{sha256}\",\n  \"content\": {content}\n}}\n")
-}
-
-fn unseal(bytes: &[u8]) -> Option<Vec<f64>> {
-    let Sealed { content, .. } = serde_json::from_slice(bytes).ok()?;
-    // There is one text for every content, so that a change anywhere is noticed.
-    let seconds = content.seconds;
-    (seal(&seconds).as_bytes() == bytes).then_some(seconds)
 }
