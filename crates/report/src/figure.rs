@@ -61,9 +61,8 @@ impl Figure {
     }
 
     /// Adds a panel to the right of the last one, or at the start of the next row.
-    pub fn with_panel(mut self, panel: impl Into<Panel>) -> Self {
-        self.panels.push(panel.into());
-        self
+    pub fn with_panel(self, panel: impl Into<Panel>) -> Self {
+        self.with_panels([panel])
     }
 
     /// Adds panels, row by row.
@@ -579,10 +578,9 @@ mod tests {
             diagonal().with_curves([falling.with_colour(1).with_style(LineStyle::Dashed)])
         };
         let nameless = |mut chart: LineChart| {
-            chart
-                .series
-                .iter_mut()
-                .for_each(|series| series.entry.label.clear());
+            for series in &mut chart.series {
+                series.entry.label.clear();
+            }
             chart
         };
         let (with, without) = (Figure::from(two()), Figure::from(nameless(two())));
