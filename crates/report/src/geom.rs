@@ -72,17 +72,11 @@ impl Rect {
     /// The largest box of the given height-to-width ratio centred in this one, with its corners on whole units, so that its frame is crisp.
     pub fn fitted(&self, aspect: f64) -> Self {
         let width = self.width.min(self.height / aspect);
-        let (x, y) = (
-            self.centre().x - 0.5 * width,
-            self.centre().y - 0.5 * width * aspect,
-        );
-        let side = |from: f64, length: f64| ((from + length).round() - from.round()).max(1.0);
-        Self::new(
-            x.round(),
-            y.round(),
-            side(x, width),
-            side(y, width * aspect),
-        )
+        let size = dvec2(width, width * aspect);
+        let corner = self.centre() - 0.5 * size;
+        let (low, high) = (corner.round(), (corner + size).round());
+        let sides = (high - low).max(DVec2::ONE);
+        Self::new(low.x, low.y, sides.x, sides.y)
     }
 
     /// Corners, clockwise from the upper left.
