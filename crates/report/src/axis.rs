@@ -286,8 +286,7 @@ pub fn signed(number: &str) -> String {
     if digits.chars().all(|c| matches!(c, '0' | '.')) {
         return digits.to_owned();
     }
-    let below_zero = number.strip_prefix('-');
-    below_zero.map_or_else(|| number.to_owned(), |digits| format!("−{digits}"))
+    number.replace('-', "−")
 }
 
 #[cfg(test)]
