@@ -206,19 +206,17 @@ fn manifest(root: &Path, file: &str) -> Result<Facts> {
     };
     let named = KEYS.into_iter().map(|key| (key, &manifest[key]));
     let parameters = parameters.iter().map(|(key, value)| (key.as_str(), value));
-    let facts = named
-        .chain(parameters)
-        .fold(Facts::default(), |facts, (key, value)| {
-            facts.with_value(key, value)
-        });
-    let phases = manifest["phases"].as_array().map_or(&[][..], Vec::as_slice);
-    Ok(phases.iter().take(MOST_PHASES).fold(facts, |facts, phase| {
+    let mut facts = Facts::default();
+    for (key, value) in named.chain(parameters) {
+        facts = facts.with_value(key, value);
+    }
+    let phases = manifest["phases"].as_array().into_iter().flatten();
+    for phase in phases.take(MOST_PHASES) {
+        let name = phase["name"].as_str().unwrap_or_default();
         let seconds = phase["seconds"].as_f64().unwrap_or(f64::NAN);
-        facts.with(
-            phase["name"].as_str().unwrap_or_default(),
-            format!("{} s", five_digits(seconds)),
-        )
-    }))
+        facts = facts.with(name, format!("{} s", five_digits(seconds)));
+    }
+    Ok(facts)
 }
 
 /// A Markdown text without the line of its title.
