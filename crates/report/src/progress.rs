@@ -1,7 +1,6 @@
 //! Progress bars on standard error, for terminals only.
 
 use std::borrow::Cow;
-use std::io::IsTerminal;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -15,14 +14,12 @@ pub struct Progress {
 impl Progress {
     /// Progress bars on standard error if it is a terminal and not `quiet`.
     pub fn new(quiet: bool) -> Self {
-        let target = if quiet || !std::io::stderr().is_terminal() {
-            ProgressDrawTarget::hidden()
-        } else {
-            ProgressDrawTarget::stderr()
-        };
-        Self {
-            bars: MultiProgress::with_draw_target(target),
+        // It draws nothing where standard error is not a terminal.
+        let bars = MultiProgress::new();
+        if quiet {
+            bars.set_draw_target(ProgressDrawTarget::hidden());
         }
+        Self { bars }
     }
 
     /// A bar below the others: message, position of `length`, time elapsed, time to go.
