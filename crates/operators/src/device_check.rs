@@ -1,9 +1,9 @@
 //! Comparison of a GPU with the CPU before it is trusted with a run.
 //!
 //! GPU drivers and auto-tuned kernels have returned wrong numbers without an error; a run that starts on such a
-//! device wastes hours. The check takes milliseconds.
+//! device wastes hours. The check takes less than a second.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 
 use burn::tensor::Device;
 
@@ -17,12 +17,15 @@ pub(crate) fn open_gpu(
     kind: DeviceKind,
     device: impl FnOnce() -> Device,
 ) -> Result<ComputeDevice, Error> {
-    // Burn panics when there is no adapter; a user gets one line instead.
+    // Burn panics when there is no adapter; a user gets one line instead, and nothing of the panic.
+    let hook = take_hook();
+    set_hook(Box::new(|_| ()));
     let opened = catch_unwind(AssertUnwindSafe(|| {
         let device = ComputeDevice::new(kind, device());
         let one = device.scalar(device.tensor::<1>(&[1.0], [1]))?;
         Ok((device, one))
     }));
+    set_hook(hook);
     let (device, _) = opened.map_err(|_| Error::Unavailable {
         name: kind.name(),
         reason: "no adapter could be opened (is a GPU driver installed?)".to_owned(),
