@@ -15,7 +15,7 @@ use crate::profile;
 use crate::spectral;
 use crate::vector::{self, Motion, SharedUpdate, VectorOps};
 
-type CubeTensor = FloatTensor<Cube>;
+pub(crate) type CubeTensor = FloatTensor<Cube>;
 
 pub(crate) fn up<const R: usize>(x: CubeTensor) -> Tensor<R> {
     Tensor::from_primitive::<Cube>(x)

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 
 use burn::tensor::{DType, Device, IndexingUpdateOp, Int, Tensor, TensorData};
 
-use crate::cube::{down, up};
+use crate::cube::{CubeTensor, down, up};
 use crate::fft::lock;
 use crate::kernels;
 
@@ -69,13 +69,11 @@ fn wrapped(width: usize, n: usize, device: &Device) -> Tensor<1, Int> {
     Tensor::from_data(TensorData::new(places, [width]), device)
 }
 
-/// The kernel on the grid `grid`, centre at the origin, as a tensor with `R` axes (leading ones of length 1).
-fn on_grid<const R: usize, const K: usize>(kernel: Tensor<K>, grid: &[usize]) -> Tensor<R> {
+/// The kernel on a grid, its centre at the origin.
+fn on_grid<const K: usize>(kernel: Tensor<K>, grid: &[usize]) -> Tensor<K> {
     let device = kernel.device();
     let width = kernel.dims()[0];
-    let mut shape = [1; R];
-    shape[R - K..].copy_from_slice(grid);
-    let mut full: Tensor<K> = kernel;
+    let mut full = kernel;
     for (axis, &n) in grid.iter().enumerate() {
         // Adds each slice at its wrapped place: a product with a 0-1 matrix would do the same with more work.
         let mut dims = full.dims();
@@ -84,7 +82,62 @@ fn on_grid<const R: usize, const K: usize>(kernel: Tensor<K>, grid: &[usize]) ->
         let zeros = Tensor::<K>::zeros(dims, (&device, full.dtype()));
         full = zeros.select_assign(axis, indices, full, IndexingUpdateOp::Add);
     }
-    full.reshape(shape)
+    full
+}
+
+/// The spectrum of a kernel on a grid.
+struct Spectrum {
+    /// Kept, so that its memory does not become that of another one.
+    kernel: CubeTensor,
+    grid: Vec<usize>,
+    parts: (CubeTensor, CubeTensor),
+}
+
+impl Spectrum {
+    fn is_of(&self, kernel: &CubeTensor, grid: &[usize]) -> bool {
+        let place = |x: &CubeTensor| {
+            let handle = &x.handle;
+            let memory = handle.memory.clone().binding().id();
+            (memory, handle.offset_start, handle.offset_end)
+        };
+        self.grid == grid
+            && self.kernel.device == kernel.device
+            && (self.kernel.dtype, &self.kernel.meta) == (kernel.dtype, &kernel.meta)
+            && place(&self.kernel) == place(kernel)
+    }
+}
+
+/// Those that were needed last: products with the Hessian have the same ones all the time, on grids of a few sizes.
+static SPECTRA: Mutex<Vec<Spectrum>> = Mutex::new(Vec::new());
+const KEPT_SPECTRA: usize = 4;
+
+fn kernel_spectrum<const R: usize, const K: usize>(
+    kernel: Tensor<K>,
+    grid: &[usize],
+) -> Complex<R> {
+    let mut spectra = lock(&SPECTRA);
+    let key = down(kernel.clone());
+    let found = spectra
+        .iter()
+        .position(|spectrum| spectrum.is_of(&key, grid));
+    let spectrum = match found {
+        Some(place) => spectra.remove(place),
+        None => {
+            let (re, im) = forward(on_grid(kernel, grid), K);
+            Spectrum {
+                kernel: key,
+                grid: grid.to_vec(),
+                parts: (down(re), down(im)),
+            }
+        }
+    };
+    let (re, im) = spectrum.parts.clone();
+    spectra.insert(0, spectrum);
+    spectra.truncate(KEPT_SPECTRA);
+    // A batch of grids has more axes.
+    let mut shape = [1; R];
+    shape[R - K..].copy_from_slice(grid);
+    (up::<K>(re).reshape(shape), up::<K>(im).reshape(shape))
 }
 
 /// See [`crate::circular_convolution`].
@@ -94,7 +147,7 @@ pub(crate) fn circular_convolution<const R: usize, const K: usize>(
     adjoint: bool,
 ) -> Tensor<R> {
     let grid: Vec<usize> = x.dims()[R - K..].to_vec();
-    let (kre, kim) = forward(on_grid::<R, K>(kernel, &grid), K);
+    let (kre, kim) = kernel_spectrum::<R, K>(kernel, &grid);
     let (re, im) = forward(x, K);
     // Correlation multiplies by the conjugate of the kernel's spectrum, its adjoint by the spectrum.
     let kim = if adjoint { kim } else { kim.neg() };
