@@ -50,14 +50,20 @@ impl Facts {
     /// The metrics in the text of a `summary.json`, a flat map from names to numbers; `name` is for
     /// messages. Numbers have five digits, and a long series `x.step0`, `x.step1`, ... one line.
     pub fn from_summary(name: &str, json: &str) -> Result<Self> {
-        let map: BTreeMap<String, f64> =
-            serde_json::from_str(json).map_err(|error| Error::Json {
-                name: name.to_owned(),
-                expected: "a flat map from names to numbers",
-                problem: error.to_string(),
-            })?;
-        let metrics = map.iter().map(|(metric, value)| (metric.as_str(), *value));
-        let mut metrics: Vec<(&str, f64)> = metrics.collect();
+        let failed = |problem: String| Error::Json {
+            name: name.to_owned(),
+            expected: "a flat map from names to numbers",
+            problem,
+        };
+        let map: BTreeMap<String, Value> =
+            serde_json::from_str(json).map_err(|error| failed(error.to_string()))?;
+        let mut metrics: Vec<(&str, f64)> = Vec::with_capacity(map.len());
+        for (metric, value) in &map {
+            let number = value
+                .as_f64()
+                .ok_or_else(|| failed(format!("{metric:?} is {value}")))?;
+            metrics.push((metric, number));
+        }
         metrics.sort_by(|(a, _), (b, _)| natural(a, b));
         let mut facts = Self::default();
         for group in
