@@ -107,6 +107,35 @@ fn convolutions_and_correlations_are_their_sums() {
     }
 }
 
+/// GPUs keep the spectra of kernels.
+#[test]
+fn kernels_are_told_apart() {
+    let width = 3;
+    let (values, x, y) = (noise(20, 1), noise(54, 2), noise(54, 3));
+    for backend in &backends() {
+        let device = &backend.device;
+        let tolerance = backend.tolerance(1e-12, 1e-5);
+        // In one memory.
+        let whole: Tensor<1> = device.tensor(&values, [values.len()]);
+        for _ in 0..2 {
+            for from in [0, 1, 11] {
+                let kernel = &values[from..from + 9];
+                let sliced: Tensor<2> = whole.clone().slice([from..from + 9]).reshape([width; 2]);
+                for (shape, x) in [([6, 9], &x), ([9, 6], &y)] {
+                    for adjoint in [false, true] {
+                        let input = device.tensor(x, shape);
+                        let found = circular_convolution(input, sliced.clone(), adjoint);
+                        let expected = convolution(x, &shape, kernel, width, adjoint);
+                        let found = device.values(found).unwrap();
+                        let what = format!("{shape:?} by a kernel from {from}");
+                        close(backend, &found, &expected, tolerance, &what);
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn convolutions_have_adjoint_gradients() {
     for backend in &backends() {
@@ -189,7 +218,7 @@ fn tables_give_a_function_and_its_derivatives() {
 
 /// So that a run in which something is not finite is stopped. (Of higher derivatives GPUs do not promise it.)
 #[test]
-fn a_table_of_what_is_not_a_number_is_none() {
+fn a_table_of_what_is_not_a_number_is_not_one_either() {
     let range = TableRange {
         low: -2.0,
         high: 2.0,

@@ -112,12 +112,13 @@ impl VectorOps for Cube {
         ranked!(x.shape().num_dims(), 1 2 3 4, R => {
             let (x, z) = (up::<R>(x), up::<R>(z));
             let (shape, dtype) = (z.dims(), z.dtype());
+            let len = shape.iter().product::<usize>();
             let data = if dtype == DType::F64 {
-                TensorData::new(updated::<R, f64>(x, z, &update), shape)
+                TensorData::new(updated::<R, f64>(x, z, &update), [len])
             } else {
-                TensorData::new(updated::<R, f32>(x, z, &update), shape)
+                TensorData::new(updated::<R, f32>(x, z, &update), [len])
             };
-            down(Tensor::<R>::from_data(data, (&device, dtype)))
+            down(Tensor::<1>::from_data(data, (&device, dtype)).reshape(shape))
         })
     }
 }

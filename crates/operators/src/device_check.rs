@@ -4,10 +4,12 @@
 //! device wastes hours. The check takes less than a second.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use burn::tensor::Device;
 
 use crate::convolution::convolve;
+use crate::fft::lock;
 use crate::{ComputeDevice, DeviceKind, Error, circular_convolution};
 
 /// Difference to the CPU that is accepted, in units of rounding, for values of size 1.
@@ -17,21 +19,35 @@ pub(crate) fn open_gpu(
     kind: DeviceKind,
     device: impl FnOnce() -> Device,
 ) -> Result<ComputeDevice, Error> {
-    // Burn panics when there is no adapter; a user gets one line instead, and nothing of the panic.
-    let hook = take_hook();
-    set_hook(Box::new(|_| ()));
-    let opened = catch_unwind(AssertUnwindSafe(|| {
+    // Burn panics when there is no adapter; a user gets one line instead.
+    let opened = quietly(|| {
         let device = ComputeDevice::new(kind, device());
         let one = device.scalar(device.tensor::<1>(&[1.0], [1]))?;
         Ok((device, one))
-    }));
-    set_hook(hook);
-    let (device, _) = opened.map_err(|_| Error::Unavailable {
+    });
+    let (device, _) = opened.map_err(|message| Error::Unavailable {
         name: kind.name(),
-        reason: "no adapter could be opened (is a GPU driver installed?)".to_owned(),
+        reason: format!("no adapter could be opened (is a GPU driver installed?): {message}"),
     })??;
     check(&device)?;
     Ok(device)
+}
+
+/// The result, or the first line of the first message of a panic, which is not shown.
+fn quietly<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    /// One at a time, since the hook belongs to the process.
+    static HOOK: Mutex<()> = Mutex::new(());
+    let _alone = lock(&HOOK);
+    let first = Arc::new(OnceLock::new());
+    let hook = take_hook();
+    let seen = first.clone();
+    set_hook(Box::new(move |panic| {
+        let message = panic.payload_as_str().unwrap_or("no message");
+        let _ = seen.set(message.lines().next().unwrap_or_default().to_owned());
+    }));
+    let result = catch_unwind(AssertUnwindSafe(work));
+    set_hook(hook);
+    result.map_err(|_| first.get().cloned().unwrap_or_default())
 }
 
 pub(crate) fn check(device: &ComputeDevice) -> Result<(), Error> {

@@ -1,4 +1,4 @@
-//! CubeCL kernels of what a step spends its time in, in the precision of their tensors. A thread computes one entry of each result.
+//! CubeCL kernels of what a step spends its time in, in the precision of their tensors. A thread writes one entry of each result.
 //!
 //! On CUDA they run without bounds checks, and the buffer of an uploaded tensor may be longer than it, since its rows are padded. So
 //! every kernel has the number of entries as an argument, and its buffers go through [`launch`].

@@ -109,7 +109,8 @@ impl Spectrum {
 
 /// Those that were needed last: products with the Hessian have the same ones all the time, on grids of a few sizes.
 static SPECTRA: Mutex<Vec<Spectrum>> = Mutex::new(Vec::new());
-const KEPT_SPECTRA: usize = 4;
+/// Points of all grids whose spectra are kept, unless it is a single one.
+const KEPT_POINTS: usize = 1 << 25;
 
 fn kernel_spectrum<const R: usize, const K: usize>(
     kernel: Tensor<K>,
@@ -133,7 +134,13 @@ fn kernel_spectrum<const R: usize, const K: usize>(
     };
     let (re, im) = spectrum.parts.clone();
     spectra.insert(0, spectrum);
-    spectra.truncate(KEPT_SPECTRA);
+    let points = |spectra: &[Spectrum]| -> usize {
+        let of = |spectrum: &Spectrum| spectrum.grid.iter().product::<usize>();
+        spectra.iter().map(of).sum()
+    };
+    while spectra.len() > 1 && points(&spectra) > KEPT_POINTS {
+        spectra.pop();
+    }
     // A batch of grids has more axes.
     let mut shape = [1; R];
     shape[R - K..].copy_from_slice(grid);

@@ -18,7 +18,7 @@ pub trait HostUpdate: Send + Sync {
     fn update<T: Real>(&self, x: &[T], z: &mut [T]);
 
     /// Where it is `z += Z S Z^T x`, with interpolation `Z` from the corners of lattice cells: that interpolation. A GPU does it itself,
-    /// and only values at corners visit the host. Without it whole vectors do.
+    /// and only values at corners visit the host, for [`Self::at_corners`]. Without it whole vectors do.
     fn interpolation(&self) -> Option<Interpolation> {
         None
     }

@@ -68,7 +68,7 @@ fn corner_sum<E: Float>(
     sums[ABSOLUTE_POS] = sum;
 }
 
-/// `z + Z v` for the values `v` at the corners of all cells.
+/// `z + Z v` for the values `v` at the corners of all cells, in the memory of `z` if nobody else holds it.
 pub(crate) fn prolonged(
     z: CubeTensor,
     at_corners: CubeTensor,

@@ -9,12 +9,20 @@ use cubecl::prelude::*;
 
 use super::launch::{threads_for, values};
 
-/// As many threads at most share a sum. Burn's own one of everything has a thousand.
+/// A sum is shared by at most this many threads. Burn's own sum of everything has a thousand.
 const PARTS: usize = 1 << 15;
 
 /// Parts of `sum a b`, or of `sum a`, which are to be summed.
 pub(crate) fn partial_sums(a: CubeTensor, b: Option<CubeTensor>) -> CubeTensor {
     let (client, dtype, len) = (a.client.clone(), a.dtype, a.shape().num_elements());
+    if let Some(b) = &b {
+        assert_eq!(a.shape(), b.shape(), "factors have the same shape");
+    }
+    // Every place is counted in 32 bits, also behind the last one.
+    assert!(
+        u32::try_from(len + PARTS).is_ok(),
+        "kernels count in 32 bits"
+    );
     let parts = PARTS.min(len);
     let shape = [parts].into();
     let sums = empty_device_contiguous_dtype(client.clone(), a.device.clone(), shape, dtype);
