@@ -171,14 +171,20 @@ fn convolutions_have_adjoint_gradients() {
     }
 }
 
-#[test]
-fn tables_give_a_function_and_its_derivatives() {
+/// The sine from -2 to 2.
+fn sine_table(cells: usize) -> HermiteTable {
     let range = TableRange {
         low: -2.0,
         high: 2.0,
-        cells: 256,
+        cells,
     };
-    let table = HermiteTable::new(range, |w| [w.sin(), w.cos(), -w.sin()]).unwrap();
+    HermiteTable::new(range, |w| [w.sin(), w.cos(), -w.sin()]).unwrap()
+}
+
+#[test]
+fn tables_give_a_function_and_its_derivatives() {
+    let table = sine_table(256);
+    let range = table.range();
     // Inside, at the ends and beyond them.
     let mut w: Vec<f64> = noise(300, 4).iter().map(|w| 2.4 * w).collect();
     w.extend([-2.0, 2.0, 0.0, -2.5, 2.5, 1.0]);
@@ -219,12 +225,8 @@ fn tables_give_a_function_and_its_derivatives() {
 /// So that a run in which something is not finite is stopped. (Of higher derivatives GPUs do not promise it.)
 #[test]
 fn a_table_of_what_is_not_a_number_is_not_one_either() {
-    let range = TableRange {
-        low: -2.0,
-        high: 2.0,
-        cells: 256,
-    };
-    let table = HermiteTable::new(range, |w| [w.sin(), w.cos(), -w.sin()]).unwrap();
+    let table = sine_table(256);
+    let range = table.range();
     for backend in &backends() {
         let device = &backend.device;
         let coefficients = device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]);
@@ -274,15 +276,7 @@ fn operations_take_slices_for_what_they_are() {
     let (grid, width) = ([6, 9], 3);
     let (x, kernel) = (noise(54, 1), noise(9, 2));
     let expected = convolution(&x, &grid, &kernel, width, false);
-    let table = HermiteTable::new(
-        TableRange {
-            low: -2.0,
-            high: 2.0,
-            cells: 512,
-        },
-        |w: f64| [w.sin(), w.cos(), -w.sin()],
-    )
-    .unwrap();
+    let table = sine_table(512);
     for backend in &backends() {
         let device = &backend.device;
         let tolerance = backend.tolerance(1e-12, 1e-5);

@@ -1,8 +1,8 @@
 //! Operations of Fourier transforms on CubeCL backends, composed of Burn's own and of transforms along single axes.
 //!
-//! A transform along an axis is a [kernel](crate::kernels): any length, and the precision of its tensors. Products
-//! with the matrix of the transform would be faster on some GPUs, but those of Burn in single precision are in TensorFloat-32 where there are
-//! tensor cores, which is off by 2e-4 on an NVIDIA H100. (burn-signal's FFT takes powers of two only.)
+//! A transform along an axis is a [kernel](crate::kernels), of any length and in the precision of its tensors. Burn's matrix products in
+//! single precision are in TensorFloat-32 where there are tensor cores: with the matrix of the transform they are off by 2e-4 on an NVIDIA H100.
+//! burn-signal's FFT takes powers of two only.
 
 use std::sync::Mutex;
 

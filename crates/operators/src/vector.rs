@@ -1,4 +1,4 @@
-//! Vector operations of iterative solvers, each one pass over memory on all cores, and work on the host in between.
+//! Vector operations of iterative solvers, on a CPU each one pass over memory on all cores, and work on the host in between.
 //!
 //! They are not differentiated, so neither captured nor on the tape.
 #![cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]

@@ -25,9 +25,8 @@ pub(crate) fn transform(
     inverse: bool,
 ) -> Parts {
     let n = re.shape()[axis];
-    let divisors = (1..=n.isqrt()).rev();
-    let a = divisors.into_iter().find(|a| n.is_multiple_of(*a));
-    let a = a.unwrap_or(1);
+    let mut divisors = (1..=n.isqrt()).rev().filter(|a| n.is_multiple_of(*a));
+    let a = divisors.next().unwrap_or(1);
     if a == 1 {
         return sums((re, im), roots, axis, (1, n), false, inverse);
     }
