@@ -1,6 +1,6 @@
 //! The extension operations on CubeCL backends (wgpu, CUDA).
 
-use burn::backend::{Cube, tensor::FloatTensor};
+use burn::backend::Cube;
 use burn::tensor::{DType, Element, Tensor, TensorData};
 use burn_backend::TensorMetadata;
 use burn_backend::ops::FloatTensorOps;
@@ -11,20 +11,10 @@ use crate::fft::Real;
 use crate::filter::SpectralFilter;
 use crate::kernels;
 use crate::ops::{GridOps, Operation};
+use crate::primitive::{CubeTensor, down, up};
 use crate::profile;
 use crate::spectral;
 use crate::vector::{self, Motion, SharedUpdate, VectorOps};
-
-pub(crate) type CubeTensor = FloatTensor<Cube>;
-
-pub(crate) fn up<const R: usize>(x: CubeTensor) -> Tensor<R> {
-    Tensor::from_primitive::<Cube>(x)
-}
-
-pub(crate) fn down<const R: usize>(x: Tensor<R>) -> CubeTensor {
-    x.try_into_primitive::<Cube>()
-        .expect("operations on a tensor of this backend stay on it")
-}
 
 /// Calls a function of tensors of static rank for a run-time rank.
 macro_rules! ranked {

@@ -111,29 +111,8 @@ impl ComputeDevice {
         }
     }
 
-    /// The same device in another precision: `f32` on a CPU, for comparisons, and `f64` on `cuda`, which is compared with the CPU first.
-    ///
-    /// # Errors
-    /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on `wgpu`, which computes wrongly there; [`Error::WrongArithmetic`].
-    pub fn with_dtype(mut self, dtype: DType) -> Result<Self, Error> {
-        let reason = match dtype {
-            DType::F32 => None,
-            DType::F64 if self.kind != DeviceKind::Wgpu => None,
-            DType::F64 => Some("is not reliable there; use f32"),
-            _ => Some("has no operations there; use f32 or f64"),
-        };
-        if let Some(reason) = reason {
-            return Err(Error::Unavailable {
-                name: self.kind.name(),
-                reason: format!("{dtype:?} {reason}"),
-            });
-        }
-        self.dtype = dtype;
-        #[cfg(feature = "cuda")]
-        if self.kind == DeviceKind::Cuda {
-            crate::device_check::check(&self)?;
-        }
-        Ok(self)
+    pub(crate) fn in_precision(self, dtype: DType) -> Self {
+        Self { dtype, ..self }
     }
 
     /// The backend.
@@ -192,22 +171,6 @@ impl ComputeDevice {
             _ => Err(Error::Read {
                 reason: format!("expected one value, got {}", values.len()),
             }),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn precisions_without_operations_are_refused() {
-        let device = ComputeDevice::default_compiled().unwrap();
-        assert!(device.clone().with_dtype(DType::F32).is_ok());
-        for dtype in [DType::F16, DType::BF16, DType::I64] {
-            let error = device.clone().with_dtype(dtype).unwrap_err();
-            assert!(matches!(error, Error::Unavailable { .. }), "{error}");
-            assert!(error.to_string().contains(&format!("{dtype:?}")), "{error}");
         }
     }
 }

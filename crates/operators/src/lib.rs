@@ -63,6 +63,8 @@ mod kernels;
 mod lanes;
 mod open;
 mod ops;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod primitive;
 mod profile;
 mod rules;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]

@@ -1,6 +1,6 @@
 //! Opening devices.
 
-use burn::tensor::Device;
+use burn::tensor::{DType, Device};
 
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 use crate::device_check;
@@ -49,5 +49,45 @@ impl ComputeDevice {
     /// As [`Self::open`]; [`Error::UnknownDevice`] for a name of no device, and if no backend was compiled in at all.
     pub fn named(name: Option<&str>) -> Result<Self, Error> {
         name.map_or_else(Self::default_compiled, |name| Self::open(name.parse()?))
+    }
+    /// The same device in another precision: `f32` on a CPU, for comparisons, and `f64` on `cuda`, which is compared with the CPU first.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on `wgpu`, which computes wrongly there; [`Error::WrongArithmetic`].
+    pub fn with_dtype(self, dtype: DType) -> Result<Self, Error> {
+        let reason = match dtype {
+            DType::F32 => None,
+            DType::F64 if self.kind() != DeviceKind::Wgpu => None,
+            DType::F64 => Some("is not reliable there; use f32"),
+            _ => Some("has no operations there; use f32 or f64"),
+        };
+        if let Some(reason) = reason {
+            return Err(Error::Unavailable {
+                name: self.kind().name(),
+                reason: format!("{dtype:?} {reason}"),
+            });
+        }
+        let device = self.in_precision(dtype);
+        #[cfg(feature = "cuda")]
+        if device.kind() == DeviceKind::Cuda {
+            device_check::check(&device)?;
+        }
+        Ok(device)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn precisions_without_operations_are_refused() {
+        let device = ComputeDevice::default_compiled().unwrap();
+        assert!(device.clone().with_dtype(DType::F32).is_ok());
+        for dtype in [DType::F16, DType::BF16, DType::I64] {
+            let error = device.clone().with_dtype(dtype).unwrap_err();
+            assert!(matches!(error, Error::Unavailable { .. }), "{error}");
+            assert!(error.to_string().contains(&format!("{dtype:?}")), "{error}");
+        }
     }
 }

@@ -8,9 +8,9 @@ use std::sync::Mutex;
 
 use burn::tensor::{DType, Device, IndexingUpdateOp, Int, Tensor, TensorData};
 
-use crate::cube::{CubeTensor, down, up};
 use crate::fft::lock;
 use crate::kernels;
+use crate::primitive::{CubeTensor, down, up};
 
 /// Real and imaginary part.
 type Complex<const R: usize> = (Tensor<R>, Tensor<R>);
