@@ -17,7 +17,7 @@ pub enum DeviceKind {
     NdArray,
     /// burn-wgpu (Vulkan, Metal, DX12) on a GPU, `f32`.
     Wgpu,
-    /// burn-cuda on an NVIDIA GPU, `f32`, or `f64` if asked for.
+    /// burn-cuda on an NVIDIA GPU: `f64` where that agrees with the CPU, or else `f32`.
     Cuda,
 }
 

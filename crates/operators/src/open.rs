@@ -8,7 +8,7 @@ use crate::{ComputeDevice, DeviceKind, Error};
 
 impl ComputeDevice {
     /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
-    /// seen to get wrong.
+    /// seen to get wrong: `cuda` in double precision, too, in which it then computes.
     ///
     /// # Errors
     /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
@@ -23,7 +23,11 @@ impl ComputeDevice {
                 Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)
             }),
             #[cfg(feature = "cuda")]
-            DeviceKind::Cuda => device_check::open_gpu(kind, || Device::cuda(0)),
+            DeviceKind::Cuda => {
+                let single = device_check::open_gpu(kind, || Device::cuda(0))?;
+                let double = single.clone().with_dtype(DType::F64);
+                Ok(double.unwrap_or(single))
+            }
             #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
             _ => Err(kind.not_compiled()),
         }
@@ -50,7 +54,7 @@ impl ComputeDevice {
     pub fn named(name: Option<&str>) -> Result<Self, Error> {
         name.map_or_else(Self::default_compiled, |name| Self::open(name.parse()?))
     }
-    /// The same device in another precision: `f32` on a CPU, for comparisons, and `f64` on `cuda`, which is compared with the CPU first.
+    /// The same device in another precision: `f32`, for comparisons, or `f64`, in which `cuda` is compared with the CPU first.
     ///
     /// # Errors
     /// [`Error::Unavailable`] for all but `f32` and `f64`, and for `f64` on `wgpu`, which computes wrongly there; [`Error::WrongArithmetic`].

@@ -401,7 +401,9 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
-            let done = self.converged(motion, solution.slope);
+            // What is less than rounding no search finds.
+            let lost = (decrease <= self.noise(point.energy)).then_some(Exit::Precision);
+            let done = self.converged(motion, solution.slope).or(lost);
             self.info.newton += 1;
             if let Some(exit) = done {
                 let u = retract(&point.u, &solution.direction, sign);

@@ -40,7 +40,7 @@ impl Backend {
     }
 }
 
-/// Every device of this build in its own precision, the first CPU in single precision too, and GPUs in double precision where they have it.
+/// Every device of this build in its own precision, the first one and GPUs in the other one too, where they have it.
 ///
 /// # Panics
 /// If one does not open, with the exception above.
@@ -56,15 +56,21 @@ pub fn backends() -> Vec<Backend> {
             Err(error) => panic!("{error}; set WILLMORE_ALLOW_MISSING_GPU=1 to leave a GPU out"),
         }
     }
-    let first = backends.first().filter(|first| first.is_double());
-    let single = first.and_then(|first| first.device.clone().with_dtype(DType::F32).ok());
-    let gpus = backends.iter().filter(|backend| !backend.is_double());
-    let double = gpus.filter_map(|gpu| match gpu.device.clone().with_dtype(DType::F64) {
-        Ok(device) => Some(device),
-        Err(operators::Error::Unavailable { .. }) => None,
-        Err(error) => panic!("{error}"),
+    let compared = backends.iter().enumerate();
+    let compared = compared.filter(|(k, backend)| *k == 0 || !backend.device.kind().is_cpu());
+    let others = compared.filter_map(|(_, backend)| {
+        let dtype = if backend.is_double() {
+            DType::F32
+        } else {
+            DType::F64
+        };
+        match backend.device.clone().with_dtype(dtype) {
+            Ok(device) => Some(device),
+            Err(operators::Error::Unavailable { .. }) => None,
+            Err(error) => panic!("{error}"),
+        }
     });
-    let others: Vec<_> = single.into_iter().chain(double).collect();
+    let others: Vec<_> = others.collect();
     backends.extend(others.into_iter().map(Backend::new));
     backends
 }
