@@ -17,8 +17,8 @@ use operators::{
     retract, spectral_filter, tabulated, update_on_host,
 };
 use solver::{
-    Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, Precision,
-    StepRecord, WillmoreFlow,
+    Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
+    WillmoreFlow,
 };
 use support::{
     Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
@@ -783,14 +783,13 @@ fn ball<const D: usize>(grid: Grid<D>, radius: f64) -> Field<D> {
     phase_field(grid, &ball, 2.0 * grid.spacing()).unwrap()
 }
 
-fn params<const D: usize>(grid: &Grid<D>, precision: Precision) -> FlowParams {
+fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams {
         eps: 2.0 * grid.spacing(),
         mcf_step: grid.spacing().powi(2),
         newton: NewtonParams {
             tolerance: 1e-3,
             cg_tolerance: 1e-2,
-            precision,
             ..NewtonParams::default()
         },
         calibration: solver::Factors::PAPER,
@@ -798,12 +797,8 @@ fn params<const D: usize>(grid: &Grid<D>, precision: Precision) -> FlowParams {
 }
 
 /// Two steps, so that the second starts from the extrapolation.
-fn flow<const D: usize>(
-    backend: &Backend,
-    grid: Grid<D>,
-    precision: Precision,
-) -> (Field<D>, [StepRecord; 2]) {
-    let params = params(&grid, precision);
+fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRecord; 2]) {
+    let params = params(&grid);
     let network = splitting_network(D, WIDTH).unwrap();
     let start = ball(grid, 0.3);
     let mut flow = WillmoreFlow::with_network(&network, &start, params, &backend.device).unwrap();
@@ -814,30 +809,34 @@ fn flow<const D: usize>(
 fn flow_case<const D: usize>(cells: usize) {
     let grid = Grid::<D>::centred(cells, 1.0).unwrap();
     let backends = backends();
-    // Products in single precision leave their rounding in the step: backends sum in different orders.
-    for (precision, double) in [(Precision::Device, 1e-9), (Precision::Single, 1e-6)] {
-        let reference = backends.iter().find(|backend| backend.is_double());
-        let reference = reference.map(|backend| flow(backend, grid, precision).0);
-        for backend in &backends {
-            let (field, records) = flow(backend, grid, precision);
-            for record in records {
-                let name = &backend.name;
-                assert!(record.energy < record.energy_before, "{name}: {record:?}");
-                let converged = record.newton.exit == Exit::Converged;
-                let is_rounding = !backend.is_double() && record.newton.exit == Exit::Precision;
-                assert!(converged || is_rounding, "{name}: {record:?}");
-            }
-            if let Some(reference) = &reference {
-                let motion = l2_distance(reference, &ball(grid, 0.3)).unwrap();
-                let difference = l2_distance(&field, reference).unwrap() / motion;
-                // In f32 the energy is known to some 1e-3 of the motion.
-                let tolerance = backend.tolerance(double, 1e-2);
-                assert!(
-                    difference <= tolerance,
-                    "{}, products in {precision:?}: {difference:.1e} of the motion {motion:.1e}",
-                    backend.name
-                );
-            }
+    let reference = backends.iter().find(|backend| backend.is_double());
+    let reference = reference.map(|backend| flow(backend, grid).0);
+    for backend in &backends {
+        let (field, records) = flow(backend, grid);
+        for record in records {
+            let name = &backend.name;
+            assert!(record.energy < record.energy_before, "{name}: {record:?}");
+            assert!(matches!(
+                record.newton.exit,
+                Exit::Converged | Exit::Precision
+            ));
+            assert!(
+                record.newton.exit == Exit::Converged || !backend.is_double(),
+                "{record:?}"
+            );
+        }
+        if let Some(reference) = &reference {
+            let motion = l2_distance(reference, &ball(grid, 0.3)).unwrap();
+            let difference = l2_distance(&field, reference).unwrap() / motion;
+            // CPUs sum in the same order. Elsewhere conjugate gradients amplify the difference: after a change of 1e-15 of the start the
+            // result is 4e-7 of the motion away on a CPU, too. In f32 the energy is known to some 1e-3 of the motion.
+            let is_cpu = backend.device.kind().is_cpu();
+            let tolerance = backend.tolerance(if is_cpu { 1e-9 } else { 2e-6 }, 1e-2);
+            assert!(
+                difference <= tolerance,
+                "{}: {difference:.1e} of the motion {motion:.1e}",
+                backend.name
+            );
         }
     }
 }
@@ -855,7 +854,7 @@ fn steps_of_the_flow_agree_in_three_dimensions() {
 #[test]
 fn steps_on_bricks_are_those_on_the_whole_grid() {
     let grid = Grid::<2>::centred(96, 1.0).unwrap();
-    let params = params(&grid, Precision::default());
+    let params = params(&grid);
     let network = Shipped::Accurate.find(params.ratios(&grid, 17)).unwrap();
     let start = ball(grid, 0.3);
     for backend in &backends() {
