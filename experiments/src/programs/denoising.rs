@@ -47,7 +47,8 @@ struct Row<'a> {
     noise: f64,
     method: &'static str,
     iterations: Option<usize>,
-    quality: Quality,
+    /// How near it is to the clean mesh, see [`QUALITY`].
+    quality: Numbers,
     seconds: f64,
     result: TriangleMesh,
 }
@@ -59,14 +60,13 @@ impl Row<'_> {
     }
 }
 
-/// How near a mesh is to the clean one.
-#[derive(Clone, Copy)]
-struct Quality {
-    /// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side.
-    rms: f64,
-    normals: f64,
-    volume: f64,
-}
+/// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side; the mean angle to its normals; the
+/// change of the volume.
+const QUALITY: [(&str, Format, &str); 3] = [
+    ("distance, %", Fixed(4), "rms"),
+    ("normals, degrees", Fixed(2), "normals"),
+    ("volume, %", Fixed(3), "volume"),
+];
 
 pub fn program(options: &Options) -> Result<()> {
     let quick = options.run.quick;
@@ -92,16 +92,13 @@ pub fn program(options: &Options) -> Result<()> {
             rows.extend(methods);
         }
     }
-    let normals = ("normals, degrees", Fixed(2));
     let table = Sheet::of(&rows)
         .keyed(|row, name| format!("{}.{name}", row.key()))
         .text("mesh", |row| &row.clean.name)
         .column("noise, %", Shortest, |row| row.noise)
         .text("method", |row| row.method)
         .column("iterations", Shortest, |row| row.iterations)
-        .measure("rms", ("distance, %", Fixed(4)), |row| row.quality.rms)
-        .measure("normals", normals, |row| row.quality.normals)
-        .measure("volume", ("volume, %", Fixed(3)), |row| row.quality.volume)
+        .numbers(&QUALITY, |row| &row.quality)
         .column("seconds", Fixed(2), |row| row.seconds);
     session.sheet(table, "denoising")?;
     let title = format!("{TITLE}: distance to the clean surface");
@@ -142,33 +139,33 @@ fn denoise<'a>(
     let (mut curves, mut taubin) = (Vec::new(), Vec::new());
     for (colour, method, factors) in [(1, "Taubin", TAUBIN), (2, "Laplacian", LAPLACIAN)] {
         let rounds = rounds(&noisy, factors).take(ITERATIONS);
-        let all: Vec<Quality> = rounds.map(|mesh| clean.quality(&mesh)).collect();
-        let best = (0..ITERATIONS).min_by(|&a, &b| all[a].rms.total_cmp(&all[b].rms));
+        let all: Vec<Numbers> = rounds.map(|mesh| clean.quality(&mesh)).collect();
+        let best = (0..ITERATIONS).min_by(|&a, &b| all[a]["rms"].total_cmp(&all[b]["rms"]));
         let best = best.unwrap_or(0) + 1;
         let clock = Instant::now();
         let mesh = noisy.smoothed(best, factors[0], factors[1]);
         let row = row(method, Some(best), mesh, clock.elapsed().as_secs_f64());
-        let least_normals = least(&all, |quality| quality.normals);
-        session.metric(&format!("{}.least_normals", row.key()), least_normals)?;
+        let normals = least(&all, "normals");
+        session.metric(&format!("{}.least_normals", row.key()), normals)?;
         rows.push(row);
         let points = (1..).zip(&all);
-        let curve = Series::of(method, points, |(k, quality)| [f64::from(k), quality.rms]);
+        let curve = Series::of(method, points, |(k, one)| [f64::from(k), one["rms"]]);
         curves.push(curve.with_colour(colour));
         if method == "Taubin" {
             taubin = all;
         }
     }
-    let [noisy, fair] = [0, 1].map(|k: usize| rows[k].quality);
+    let [noisy, fair] = [0, 1].map(|k: usize| &rows[k].quality);
     let usual = &taubin[USUAL.start() - 1..*USUAL.end()];
     for (name, taubin) in [("taubin", usual), ("best_taubin", &taubin[..])] {
-        let distances = fair.rms / least(taubin, |quality| quality.rms);
-        let normals = fair.normals / least(taubin, |quality| quality.normals);
+        let distances = fair["rms"] / least(taubin, "rms");
+        let normals = fair["normals"] / least(taubin, "normals");
         let key = clean.key(noise);
         session.metric(&format!("{key}.fair_over_{name}"), distances)?;
         session.metric(&format!("{key}.normals_over_{name}"), normals)?;
     }
-    let level = |name, quality: Quality| {
-        Series::new(name, [1.0, ITERATIONS as f64].map(|x| [x, quality.rms]))
+    let level = |name, quality: &Numbers| {
+        Series::new(name, [1.0, ITERATIONS as f64].map(|x| [x, quality["rms"]]))
     };
     curves.push(level("fair", fair).with_colour(0));
     let noisy = level("noisy", noisy).with_colour(4);
@@ -178,8 +175,8 @@ fn denoise<'a>(
     Ok((rows, chart.with_curves(curves)))
 }
 
-fn least(all: &[Quality], of: fn(&Quality) -> f64) -> f64 {
-    all.iter().map(of).fold(f64::MAX, f64::min)
+fn least(all: &[Numbers], name: &str) -> f64 {
+    all.iter().map(|one| one[name]).fold(f64::MAX, f64::min)
 }
 
 /// The built-in shapes, and the meshes that are chosen or here.
@@ -234,7 +231,7 @@ impl Clean {
         noisy
     }
 
-    fn quality(&self, mesh: &TriangleMesh) -> Quality {
+    fn quality(&self, mesh: &TriangleMesh) -> Numbers {
         let rms = rms_distance(mesh, &self.distance);
         let clean = self.mesh.mesh();
         let angles = mesh.faces.iter().map(|&face| {
@@ -242,11 +239,12 @@ impl Clean {
             let cosine: f64 = (0..3).map(|i| a[i] * b[i]).sum();
             cosine.clamp(-1.0, 1.0).acos().to_degrees()
         });
-        Quality {
-            rms: 100.0 * rms / self.mesh.bounding_box().longest_side(),
-            normals: angles.sum::<f64>() / mesh.faces.len() as f64,
-            volume: 100.0 * (mesh.volume() / self.mesh.volume() - 1.0),
-        }
+        let volume = mesh.volume() / self.mesh.volume() - 1.0;
+        Numbers::from([
+            ("rms", 100.0 * rms / self.mesh.bounding_box().longest_side()),
+            ("normals", angles.sum::<f64>() / mesh.faces.len() as f64),
+            ("volume", 100.0 * volume),
+        ])
     }
 
     fn key(&self, noise: f64) -> String {
