@@ -185,13 +185,12 @@ fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
             shown.caption = format!("{}\n{torus}", shown.caption);
             shown.tubes = circles.map(tube).collect();
         }
-        for (name, value) in [
-            ("l2", Some(l2)),
-            ("w", w),
-            ("outer_radius", Some(outer_radius)),
-        ] {
-            session.metric(&format!("{}.clifford_{name}", one.key()), value)?;
-        }
+        let metrics = [
+            ("clifford_l2", l2.into()),
+            ("clifford_w", w.into()),
+            ("clifford_outer_radius", outer_radius.into()),
+        ];
+        session.metrics(&one.key(), metrics)?;
         tori.insert(one.key(), torus);
     }
     session.output.write_json("clifford.json", &tori)?;
