@@ -60,17 +60,13 @@ const COLUMNS: [(&str, Format, &str); 7] = [
 ];
 
 impl StorageOptions {
-    /// Refuses resolutions that cannot be measured.
-    pub fn check(&self) -> Result<()> {
+    /// What is measured, for the manifest; what cannot be read or measured, or is not for all of the grids, is refused.
+    pub fn about(&self, run: &RunOptions) -> Result<Value> {
         let possible = |n: &usize| *n >= 16 && n.is_multiple_of(8);
         let mut cells = self.surface_cells.iter().chain(&self.curve_cells);
         let message =
             "--surface-cells and --curve-cells must be multiples of 8, from 16 on, as bricks are";
-        require(cells.all(possible), message)
-    }
-
-    /// What is measured, for the manifest; what cannot be read, or is not for all of the grids, is refused.
-    pub fn about(&self, run: &RunOptions) -> Result<Value> {
+        require(cells.all(possible), message)?;
         let [curve_cells, surface_cells] = self.cells(run);
         let mut mesh = Value::Null;
         for &n in &surface_cells {

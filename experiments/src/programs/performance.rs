@@ -79,7 +79,6 @@ pub fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.turns.is_finite() && options.turns > 0.0;
     require(possible, "--turns must be positive")?;
-    options.storage.check()?;
     let planes: &[usize] = if quick { &[128] } else { &[128, 256, 512] };
     let solids = run.either(
         [("cube", 24, 2), ("blob", 32, 2)],
