@@ -155,15 +155,11 @@ fn compare<'a, const D: usize>(
             };
             let steps = (&stepping.key[..], stepping.steps, marks[marks.len() - 1].1);
             let run = sample.run(session, (n, 2.0), variant, steps)?;
-            let mut at = marks.to_vec();
-            if stepping.kind == GRADED {
-                for (_, time) in &mut at {
-                    *time = truth::at(&run, *time).time;
-                }
-            }
-            let own = (at != marks)
-                .then(|| sample.exact(Flow::Willmore, &at))
-                .transpose()?;
+            let own = (stepping.kind == GRADED).then(|| {
+                let end = |&(mark, time): &(usize, f64)| (mark, truth::at(&run, time).time);
+                sample.exact(Flow::Willmore, &marks.iter().map(end).collect::<Vec<_>>())
+            });
+            let own = own.transpose()?;
             for truth in own.as_ref().unwrap_or(&exact) {
                 rows.push(Compared {
                     sample: sample.key,
