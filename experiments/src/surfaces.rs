@@ -130,7 +130,6 @@ const MEASURES: [(&str, Format, &str); 5] = [
 
 pub struct Snapshot {
     pub step: usize,
-    pub time: f64,
     pub measures: Numbers,
     /// The Willmore energy that the paper reports.
     pub paper: Option<f64>,
@@ -223,7 +222,6 @@ impl Flowed {
         let reported = reported.find(|(shown, _)| *shown == step);
         Ok(Snapshot {
             step,
-            time: record.map_or(0.0, |r| r.time),
             measures,
             paper: reported.and_then(|(_, w)| *w),
             caption: match w.or(w_scheme) {

@@ -123,7 +123,8 @@ pub fn program(options: &Options) -> Result<()> {
 fn decorate(snapshots: &mut [Snapshot], measured: &Inpainted<'_, 3>) {
     let [low, high] = measured.shape.region;
     for snapshot in snapshots {
-        let (step, after) = (snapshot.step, (snapshot.time / TAU).round());
+        let (step, run) = (snapshot.step, measured.trajectory);
+        let after = run.record(step).map_or(0.0, |r| (r.time / TAU).round());
         let time = (after > step as f64).then(|| format!(" (t = {after} τ)"));
         let distance = measured.distances.iter().find(|(k, _)| *k == step);
         let distance = distance.filter(|_| measured.shape.whole.is_some());
