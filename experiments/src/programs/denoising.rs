@@ -60,8 +60,8 @@ impl Row<'_> {
     }
 }
 
-/// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side; the mean angle to its normals; the
-/// change of the volume.
+/// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side; the mean angle to its normals;
+/// the change of the volume.
 const QUALITY: [(&str, Format, &str); 3] = [
     ("distance, %", Fixed(4), "rms"),
     ("normals, degrees", Fixed(2), "normals"),
