@@ -2,7 +2,7 @@
 
 use std::any::Any;
 
-use fem::{FiniteElementStep, Statistics};
+use fem::FiniteElementStep;
 use geometry::Stored;
 use model::Network;
 use operators::ComputeDevice;
@@ -17,6 +17,7 @@ pub(crate) trait Motion<const D: usize> {
     fn advance(
         &mut self,
         size: f64,
+        order: Order,
         constraints: Constraints,
         accept: &mut dyn FnMut(&StepRecord) -> bool,
     ) -> Result<(Option<StepRecord>, bool), solver::Error>;
@@ -32,40 +33,105 @@ pub(crate) trait Motion<const D: usize> {
 
     /// Goes to such a state.
     fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error>;
-
-    /// Work of the linear solves inside finite elements so far.
-    fn statistics(&self) -> Option<Statistics>;
 }
+
+impl<const D: usize> Motion<D> for WillmoreFlow<D> {
+    fn advance(
+        &mut self,
+        size: f64,
+        order: Order,
+        constraints: Constraints,
+        accept: &mut dyn FnMut(&StepRecord) -> bool,
+    ) -> Result<(Option<StepRecord>, bool), solver::Error> {
+        self.constrain(constraints)?;
+        let (record, accepted) = match order {
+            Order::First => (WillmoreFlow::advance(self, size)?, true),
+            Order::Second | Order::Controlled(_) => self.advance_second_order(size, accept)?,
+        };
+        Ok((Some(record), accepted))
+    }
+
+    fn stored(&self) -> Result<Stored<D>, solver::Error> {
+        self.stored_field()
+    }
+
+    fn stored_cells(&self) -> Option<usize> {
+        Some(WillmoreFlow::stored_cells(self))
+    }
+
+    fn state(&self, _: usize, _: f64) -> Result<FlowState<D>, solver::Error> {
+        WillmoreFlow::state(self)
+    }
+
+    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
+        WillmoreFlow::restore(self, state)
+    }
+}
+
+impl<const D: usize> Motion<D> for MeanCurvatureFlow<D> {
+    fn advance(
+        &mut self,
+        _: f64,
+        _: Order,
+        _: Constraints,
+        _: &mut dyn FnMut(&StepRecord) -> bool,
+    ) -> Result<(Option<StepRecord>, bool), solver::Error> {
+        MeanCurvatureFlow::advance(self)?;
+        Ok((None, true))
+    }
+
+    fn stored(&self) -> Result<Stored<D>, solver::Error> {
+        Ok(Stored::whole(self.field()?))
+    }
+
+    fn stored_cells(&self) -> Option<usize> {
+        None
+    }
+
+    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
+        // Nothing else is known of it.
+        Ok(FlowState {
+            current: self.field()?.into_values(),
+            step: count,
+            time,
+            ..FlowState::default()
+        })
+    }
+
+    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
+        MeanCurvatureFlow::restore(self, state)
+    }
+}
+
+/// The flow of a case, and the finite-element step inside, for its statistics.
+type Made<const D: usize> = (Box<dyn Motion<D>>, Option<FiniteElementStep<D>>);
 
 /// Makes the flow of a case, at a state of it or at its start.
 type Make<const D: usize> =
-    fn(&Case<D>, Option<&FlowState<D>>, &ComputeDevice) -> Result<Box<dyn Motion<D>>, Error>;
+    fn(&Case<D>, Option<&FlowState<D>>, &ComputeDevice) -> Result<Made<D>, Error>;
 
 /// A [`Make`] for each dimension. The solver is generic in it, and what is generic is compiled in every crate that calls it; what a static
 /// names is compiled here, once for all programs and tests.
-static MAKES: [&(dyn Any + Send + Sync); 2] = [
-    &(SolverFlow::motion as Make<2>),
-    &(SolverFlow::motion as Make<3>),
-];
+static MAKES: [&(dyn Any + Send + Sync); 2] = [&(make as Make<2>), &(make as Make<3>)];
 
 /// The flow of a case, at a state of it or at its start, if it fits into the memory.
 pub(crate) fn of<const D: usize>(
     case: &Case<D>,
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
-) -> Result<Box<dyn Motion<D>>, Error> {
+) -> Result<Made<D>, Error> {
     let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
     let whole = !takes_bricks || case.operator.storage == Storage::Dense;
     if whole {
         check_memory(case, device, nodes, takes_bricks)?;
     }
     let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
-    let motion = make.expect("a case is in the plane or in space")(case, state, device)?;
+    let made = make.expect("a case is in the plane or in space")(case, state, device)?;
     if !whole {
         // How many cells are stored is known only now; little is allocated yet.
-        check_memory(case, device, motion.stored_cells().unwrap_or(nodes), true)?;
+        check_memory(case, device, made.0.stored_cells().unwrap_or(nodes), true)?;
     }
-    Ok(motion)
+    Ok(made)
 }
 
 /// Refuses a flow of which so many cells are stored if the memory of the CPU is too small for it.
@@ -81,141 +147,56 @@ fn check_memory<const D: usize>(
     Ok(())
 }
 
-/// A flow of the solver.
-struct SolverFlow<const D: usize> {
-    flow: Either<D>,
-    /// The finite-element step inside, for its statistics.
-    elements: Option<FiniteElementStep<D>>,
-    order: Order,
-}
-
-enum Either<const D: usize> {
-    Willmore(Box<WillmoreFlow<D>>),
-    MeanCurvature(Box<MeanCurvatureFlow<D>>),
-}
-
-impl<const D: usize> SolverFlow<D> {
-    fn motion(
-        case: &Case<D>,
-        state: Option<&FlowState<D>>,
-        device: &ComputeDevice,
-    ) -> Result<Box<dyn Motion<D>>, Error> {
-        let (params, operator) = (case.params(), &case.operator);
-        let whole = match (case.flow, operator.method) {
-            (Flow::Willmore, Method::Hybrid) => None,
-            (Flow::MeanCurvature, _) => Some("mean curvature flows"),
-            (Flow::Willmore, _) => Some("finite elements"),
-        };
-        if let Some(what) = whole.filter(|_| operator.storage == Storage::Bricks) {
-            return Err(solver::Error::NeedsGrid { what }.into());
-        }
-        let elements = match operator.network() {
-            Some(_) => None,
-            None => Some(operator.elements(case.grid(), &case.scales)?),
-        };
-        let flow = match case.flow {
-            Flow::Willmore => {
-                let mut flow = match &elements {
-                    Some(step) => {
-                        WillmoreFlow::new(step.clone(), &case.initial.field()?, params, device)?
-                    }
-                    None => learned(case, device)?,
-                };
-                if !case.energy.is_willmore() {
-                    flow.set_energy(case.energy, operator.response)?;
-                }
-                if let Some(region) = &case.region {
-                    flow.restrict_to(region)?;
-                }
-                // What no shape has is refused before the first step: the targets, and sizes on the way to them.
-                flow.constrain(case.held.targets())?;
-                case.held.check(case.grid())?;
-                for step in 1..=case.held.steps() {
-                    flow.constrain(case.held.at(step as f64))?;
-                }
-                Either::Willmore(Box::new(flow))
+fn make<const D: usize>(
+    case: &Case<D>,
+    state: Option<&FlowState<D>>,
+    device: &ComputeDevice,
+) -> Result<Made<D>, Error> {
+    let (params, operator) = (case.params(), &case.operator);
+    let whole = match (case.flow, operator.method) {
+        (Flow::Willmore, Method::Hybrid) => None,
+        (Flow::MeanCurvature, _) => Some("mean curvature flows"),
+        (Flow::Willmore, _) => Some("finite elements"),
+    };
+    if let Some(what) = whole.filter(|_| operator.storage == Storage::Bricks) {
+        return Err(solver::Error::NeedsGrid { what }.into());
+    }
+    let elements = match operator.network() {
+        Some(_) => None,
+        None => Some(operator.elements(case.grid(), &case.scales)?),
+    };
+    let mut motion: Box<dyn Motion<D>> = match case.flow {
+        Flow::Willmore => {
+            let mut flow = match elements.clone() {
+                Some(step) => WillmoreFlow::new(step, &case.initial.field()?, params, device)?,
+                None => learned(case, device)?,
+            };
+            if !case.energy.is_willmore() {
+                flow.set_energy(case.energy, operator.response)?;
             }
-            Flow::MeanCurvature => {
-                let from = case.initial.field()?;
-                let flow = match &elements {
-                    Some(step) => MeanCurvatureFlow::new(step.clone(), &from, device)?,
-                    None => MeanCurvatureFlow::with_network(network(case), &from, &params, device)?,
-                };
-                Either::MeanCurvature(Box::new(flow))
+            if let Some(region) = &case.region {
+                flow.restrict_to(region)?;
             }
-        };
-        let order = case.steps.order;
-        let mut motion = Self {
-            flow,
-            elements,
-            order,
-        };
-        if let Some(state) = state {
-            motion.restore(state)?;
-        }
-        Ok(Box::new(motion))
-    }
-}
-
-impl<const D: usize> Motion<D> for SolverFlow<D> {
-    fn advance(
-        &mut self,
-        size: f64,
-        constraints: Constraints,
-        accept: &mut dyn FnMut(&StepRecord) -> bool,
-    ) -> Result<(Option<StepRecord>, bool), solver::Error> {
-        if let Either::Willmore(flow) = &mut self.flow {
-            flow.constrain(constraints)?;
-        }
-        match &mut self.flow {
-            Either::Willmore(flow) if self.order == Order::First => {
-                Ok((Some(flow.advance(size)?), true))
+            // What no shape has is refused before the first step: the targets, and sizes on the way to them.
+            flow.constrain(case.held.targets())?;
+            case.held.check(case.grid())?;
+            for step in 1..=case.held.steps() {
+                flow.constrain(case.held.at(step as f64))?;
             }
-            Either::Willmore(flow) => {
-                let (record, accepted) = flow.advance_second_order(size, accept)?;
-                Ok((Some(record), accepted))
-            }
-            Either::MeanCurvature(flow) => Ok((flow.advance().map(|()| None)?, true)),
+            Box::new(flow)
         }
-    }
-
-    fn stored(&self) -> Result<Stored<D>, solver::Error> {
-        match &self.flow {
-            Either::Willmore(flow) => flow.stored_field(),
-            Either::MeanCurvature(flow) => Ok(Stored::whole(flow.field()?)),
+        Flow::MeanCurvature => {
+            let from = case.initial.field()?;
+            Box::new(match elements.clone() {
+                Some(step) => MeanCurvatureFlow::new(step, &from, device)?,
+                None => MeanCurvatureFlow::with_network(network(case), &from, &params, device)?,
+            })
         }
+    };
+    if let Some(state) = state {
+        motion.restore(state)?;
     }
-
-    fn stored_cells(&self) -> Option<usize> {
-        match &self.flow {
-            Either::Willmore(flow) => Some(flow.stored_cells()),
-            Either::MeanCurvature(_) => None,
-        }
-    }
-
-    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
-        match &self.flow {
-            Either::Willmore(flow) => flow.state(),
-            // Nothing else is known of it.
-            Either::MeanCurvature(flow) => Ok(FlowState {
-                current: flow.field()?.into_values(),
-                step: count,
-                time,
-                ..FlowState::default()
-            }),
-        }
-    }
-
-    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
-        match &mut self.flow {
-            Either::Willmore(flow) => flow.restore(state),
-            Either::MeanCurvature(flow) => flow.restore(state),
-        }
-    }
-
-    fn statistics(&self) -> Option<Statistics> {
-        self.elements.as_ref().map(FiniteElementStep::statistics)
-    }
+    Ok((motion, elements))
 }
 
 fn network<const D: usize>(case: &Case<D>) -> &Network {

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use fem::FiniteElementStep;
 use geometry::measure::{has_interface, l2_distance_of_parts};
 use geometry::{Field, PhaseField, Stored, require};
 use operators::ComputeDevice;
@@ -21,6 +22,7 @@ pub struct Run<const D: usize> {
     pub(crate) device: ComputeDevice,
     identity: OnceLock<Value>,
     motion: Box<dyn Motion<D>>,
+    elements: Option<FiniteElementStep<D>>,
     control: StepControl,
     /// How many steps the targets of what is held have gone, parts of steps included.
     ramped: f64,
@@ -80,12 +82,13 @@ impl<const D: usize> Run<D> {
             ramped += record.tau / step_size;
             control.accept(record)?;
         }
-        let motion = motion::of(&case, state, device)?;
+        let (motion, elements) = motion::of(&case, state, device)?;
         // Before the first step all of the initial values count, also where they are not stored.
         let begun = state.filter(|_| !records.is_empty());
         let stored = begun.map(|_| motion.stored()).transpose()?;
         let mut run = Self {
             motion,
+            elements,
             device: device.clone(),
             identity: OnceLock::new(),
             stored,
@@ -157,7 +160,7 @@ impl<const D: usize> Run<D> {
             most = most.max(halvings_of_motion);
         }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
-        let longest = self.case.steps.longest_move;
+        let (order, longest) = (self.case.steps.order, self.case.steps.longest_move);
         let before = longest.map(|_| self.before()).transpose()?;
         // What was too long for the last step is not tried again at once.
         let last = self
@@ -180,7 +183,7 @@ impl<const D: usize> Run<D> {
             // A shorter step changes what is held by less, too.
             let ramped = self.ramped + size / self.control.step_size();
             let constraints = self.case.held.at(ramped);
-            let refused = match self.motion.advance(size, constraints, accept) {
+            let refused = match self.motion.advance(size, order, constraints, accept) {
                 Ok((minimization, true)) => {
                     self.torn = true;
                     // Of what it may.
@@ -335,7 +338,7 @@ impl<const D: usize> Run<D> {
 
     /// Work of the linear solves inside finite elements so far; none for a learned operator.
     pub fn statistics(&self) -> Option<fem::Statistics> {
-        self.motion.statistics()
+        self.elements.as_ref().map(FiniteElementStep::statistics)
     }
 
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
