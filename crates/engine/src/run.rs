@@ -24,8 +24,6 @@ pub struct Run<const D: usize> {
     motion: Box<dyn Motion<D>>,
     elements: Option<FiniteElementStep<D>>,
     control: StepControl,
-    /// How many steps the targets of what is held have gone, parts of steps included.
-    ramped: f64,
     /// What is stored of the phase field after the last step; nothing before the first one.
     stored: Option<Stored<D>>,
     /// The same on the whole grid, once it was asked for.
@@ -76,10 +74,7 @@ impl<const D: usize> Run<D> {
             )?;
         }
         let mut control = StepControl::new(&case)?;
-        let (mut step_size, mut ramped) = (control.step_size(), 0.0);
         for record in &records {
-            step_size = control.step_size();
-            ramped += record.tau / step_size;
             control.accept(record)?;
         }
         let (motion, elements) = motion::of(&case, state, device)?;
@@ -95,13 +90,12 @@ impl<const D: usize> Run<D> {
             whole: OnceLock::new(),
             case,
             control,
-            ramped,
             start,
             records,
             torn: false,
             ended: None,
         };
-        run.ended = run.stop(step_size);
+        run.ended = run.stop();
         Ok(run)
     }
 
@@ -126,7 +120,6 @@ impl<const D: usize> Run<D> {
         let travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
         let seconds = clock.elapsed().as_secs_f64();
-        let step_size = self.control.step_size();
         let mcf_step = self.case.scales.mcf_step;
         let count = self.records.len() + 1;
         let time = (made.minimization).map_or(count as f64 * mcf_step, |step| step.time);
@@ -144,11 +137,10 @@ impl<const D: usize> Run<D> {
             measures: values(&self.case.measures, &self.current(), time)?,
             seconds,
         };
-        self.ramped += record.tau / step_size;
         record.completes_step = self.control.accept(&record)?;
         self.records.push(record);
         self.torn = false;
-        self.ended = self.stop(step_size);
+        self.ended = self.stop();
         Ok(self.records.last())
     }
 
@@ -181,8 +173,8 @@ impl<const D: usize> Run<D> {
                 shorter.is_none()
             };
             // A shorter step changes what is held by less, too.
-            let ramped = self.ramped + size / self.control.step_size();
-            let constraints = self.case.held.at(ramped);
+            let gone = self.control.gone + size / self.control.step_size();
+            let constraints = self.case.held.at(gone);
             let refused = match self.motion.advance(size, order, constraints, accept) {
                 Ok((minimization, true)) => {
                     self.torn = true;
@@ -248,20 +240,20 @@ impl<const D: usize> Run<D> {
         }
     }
 
-    /// The first stop rule that holds, where the last record belongs to a time step of this size.
-    fn stop(&self, step_size: f64) -> Option<Stop> {
+    /// The first stop rule that holds.
+    fn stop(&self) -> Option<Stop> {
         let case = &self.case;
         let progress = Progress {
             records: &self.records,
             initial: &case.initial,
             current: self.current(),
             steps: self.steps(),
-            step_size,
+            step_size: self.control.last_size,
             largest_step: case.largest_step(),
             least_energy: case.least_energy(),
             is_willmore: case.energy.is_willmore(),
         };
-        let driven = !case.held.is_reached(self.ramped);
+        let driven = !case.held.is_reached(self.control.gone);
         let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
         stops.find(|stop| stop.holds(&progress)).copied()
     }
