@@ -114,29 +114,13 @@ impl<const D: usize> Run<D> {
         }
         let clock = Instant::now();
         self.whole.take();
-        let made = self.attempt()?;
+        let mut record = self.attempt()?;
         let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        let moved = self.distance(&now, self.stored());
-        let travelled = self.distance(&now, &self.case.initial);
+        record.moved = self.distance(&now, self.stored());
+        record.travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
-        let seconds = clock.elapsed().as_secs_f64();
-        let mcf_step = self.case.scales.mcf_step;
-        let count = self.records.len() + 1;
-        let time = (made.minimization).map_or(count as f64 * mcf_step, |step| step.time);
-        let mut record = Record {
-            step: self.control.step(),
-            completes_step: false,
-            time,
-            tau: made.minimization.map_or(mcf_step, |step| step.tau),
-            halvings: made.halvings,
-            far: made.far,
-            refused_hvp: made.refused_hvp,
-            moved,
-            travelled,
-            minimization: made.minimization,
-            measures: values(&self.case.measures, &self.current(), time)?,
-            seconds,
-        };
+        record.seconds = clock.elapsed().as_secs_f64();
+        record.measures = values(&self.case.measures, &self.current(), record.time)?;
         record.completes_step = self.control.accept(&record)?;
         self.records.push(record);
         self.torn = false;
@@ -144,8 +128,8 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
-    /// A step that succeeds and is short enough.
-    fn attempt(&mut self) -> Result<Attempt, Error> {
+    /// A step that succeeds and is short enough, and what its record has to say of that alone.
+    fn attempt(&mut self) -> Result<Record, Error> {
         let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
         let halvings_of_motion = self.control.halvings_of_motion();
         if !self.case.held.is_empty() {
@@ -153,18 +137,19 @@ impl<const D: usize> Run<D> {
         }
         let (mut halvings, mut refused_hvp) = (0, 0.0);
         let (order, longest) = (self.case.steps.order, self.case.steps.longest_move);
-        let before = longest.map(|_| self.before()).transpose()?;
+        // Where it is before the step, for trying that again.
+        let before = match longest {
+            Some(longest) => Some((longest, self.state()?, self.motion.stored()?)),
+            None => None,
+        };
         // What was too long for the last step is not tried again at once.
-        let last = self
-            .records
-            .last()
-            .filter(|last| longest.is_some() && last.halvings > 0);
-        let longer = |last: &Record| if last.far { 1.5 } else { 2.0 };
-        while last.is_some_and(|last| size > longer(last) * last.tau)
-            && halvings < halvings_of_motion
-        {
-            size *= 0.5;
-            halvings += 1;
+        let last = self.records.last().filter(|_| longest.is_some());
+        if let Some(last) = last.filter(|last| last.halvings > 0) {
+            let longer = if last.far { 1.5 } else { 2.0 };
+            while size > longer * last.tau && halvings < halvings_of_motion {
+                size *= 0.5;
+                halvings += 1;
+            }
         }
         loop {
             let mut shorter = None;
@@ -179,17 +164,23 @@ impl<const D: usize> Run<D> {
                 Ok((minimization, true)) => {
                     self.torn = true;
                     // Of what it may.
-                    let part = match (longest, &before) {
-                        (Some(longest), Some((_, before))) => self.has_gone(before)? / longest,
-                        _ => 0.0,
+                    let part = match &before {
+                        Some((longest, _, before)) => self.has_gone(before)? / longest,
+                        None => 0.0,
                     };
                     let too_far = part > 1.0 && halvings < halvings_of_motion;
-                    let Some((state, _)) = before.as_ref().filter(|_| too_far) else {
-                        return Ok(Attempt {
+                    let Some((_, state, _)) = before.as_ref().filter(|_| too_far) else {
+                        let mcf_step = self.case.scales.mcf_step;
+                        let count = self.records.len() + 1;
+                        return Ok(Record {
+                            step: self.control.step(),
+                            time: minimization.map_or(count as f64 * mcf_step, |made| made.time),
+                            tau: minimization.map_or(mcf_step, |made| made.tau),
                             halvings,
                             far: part > FAR,
                             refused_hvp,
                             minimization,
+                            ..Record::default()
                         });
                     };
                     let restored = self.motion.restore(state);
@@ -226,11 +217,6 @@ impl<const D: usize> Run<D> {
             return Ok(f64::INFINITY);
         }
         Ok(widths_between(before, &now).max(widths_between(&now, before)))
-    }
-
-    /// Where it is before a step, for trying that again.
-    fn before(&self) -> Result<(FlowState<D>, Stored<D>), Error> {
-        Ok((self.state()?, self.motion.stored()?))
     }
 
     fn failed(&self, source: solver::Error) -> Error {
@@ -336,16 +322,6 @@ impl<const D: usize> Run<D> {
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
         Ok(self.motion.state(self.records.len(), self.time())?)
     }
-}
-
-struct Attempt {
-    /// How often it was tried with a longer size,
-    halvings: u32,
-    /// whether a step twice as long would have been too long,
-    far: bool,
-    /// and Hessian-vector products of those tries that were refused.
-    refused_hvp: f64,
-    minimization: Option<StepRecord>,
 }
 
 /// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
