@@ -1,14 +1,15 @@
 //! A flow and everything that its result depends on.
 
+use std::sync::OnceLock;
+
 use fem::FiniteElementStep;
 use files::{Sha256, hexadecimal};
-use geometry::{Grid, Stored};
+use geometry::{Field, Grid, Stored};
 use operators::ComputeDevice;
 use serde_json::{Value, json};
 use solver::FlowParams;
 
-use crate::current::Kept;
-use crate::{Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
+use crate::{Current, Error, Flow, Held, Helfrich, Measure, Operator, Scales, Stop, TimeSteps};
 
 /// A flow with everything that its result depends on, but for the device.
 #[derive(Clone, Debug)]
@@ -66,10 +67,17 @@ impl<const D: usize> Case<D> {
         self.initial.grid()
     }
 
-    pub(crate) fn kept(&self) -> Kept<'_, D> {
-        Kept {
+    /// A phase field of the flow, given what is stored of it.
+    pub(crate) fn current<'a>(
+        &'a self,
+        stored: &'a Stored<D>,
+        whole: &'a OnceLock<Field<D>>,
+    ) -> Current<'a, D> {
+        Current {
+            stored,
             initial: &self.initial,
             region: self.region.as_deref(),
+            whole,
         }
     }
 

@@ -10,15 +10,10 @@ use geometry::{Field, Nodes, PhaseField, Stored};
 pub struct Current<'a, const D: usize> {
     /// The initial one before the first step.
     pub(crate) stored: &'a Stored<D>,
-    pub(crate) kept: Kept<'a, D>,
-    pub(crate) whole: &'a OnceLock<Field<D>>,
-}
-
-/// What a flow keeps of its initial phase field: the values outside of the region, if there is one.
-#[derive(Clone, Copy)]
-pub(crate) struct Kept<'a, const D: usize> {
+    /// What it keeps the values of outside of the region, if there is one.
     pub(crate) initial: &'a Stored<D>,
     pub(crate) region: Option<&'a [bool]>,
+    pub(crate) whole: &'a OnceLock<Field<D>>,
 }
 
 impl<'a, const D: usize> Current<'a, D> {
@@ -30,9 +25,20 @@ impl<'a, const D: usize> Current<'a, D> {
         })
     }
 
-    /// Writes the values of the whole grid from a node on, whole rows of bricks.
+    /// Writes the values of the whole grid from a node on, whole rows of bricks: those that are stored, and outside of the region the initial
+    /// ones, which it keeps even where nothing is stored.
     pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
-        self.kept.read(self.stored, start, part);
+        self.stored.read(start, part);
+        if let Some(region) = self.region {
+            let mut initial = vec![0.0; part.len()];
+            self.initial.read(start, &mut initial);
+            let kept = initial.iter().zip(&region[start..]);
+            for (value, (initial, moves)) in part.iter_mut().zip(kept) {
+                if !moves {
+                    *value = *initial;
+                }
+            }
+        }
     }
 }
 
@@ -59,28 +65,10 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
 
     fn at(&self, place: [usize; D]) -> f64 {
         let keeps = |region: &[bool]| !region[self.stored.grid().index(place)];
-        if self.kept.region.is_some_and(keeps) {
-            self.kept.initial.at(place)
+        if self.region.is_some_and(keeps) {
+            self.initial.at(place)
         } else {
             self.stored.at(place)
-        }
-    }
-}
-
-impl<const D: usize> Kept<'_, D> {
-    /// Writes values of a phase field from a node on, whole rows of bricks: those that are stored, and outside of the region the initial ones,
-    /// which it keeps even where nothing is stored.
-    pub(crate) fn read(&self, stored: &Stored<D>, start: usize, part: &mut [f64]) {
-        stored.read(start, part);
-        if let Some(region) = self.region {
-            let mut initial = vec![0.0; part.len()];
-            self.initial.read(start, &mut initial);
-            let kept = initial.iter().zip(&region[start..]);
-            for (value, (initial, moves)) in part.iter_mut().zip(kept) {
-                if !moves {
-                    *value = *initial;
-                }
-            }
         }
     }
 }

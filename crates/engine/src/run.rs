@@ -42,11 +42,8 @@ impl<const D: usize> Run<D> {
     /// If something in the case is not possible: [`Error::Solver`], [`Error::Fem`], [`Error::Geometry`].
     pub fn new(case: Case<D>, device: &ComputeDevice) -> Result<Self, Error> {
         case.initial.check_finite()?;
-        let initial = Current {
-            stored: &case.initial,
-            kept: case.kept(),
-            whole: &OnceLock::new(),
-        };
+        let whole = OnceLock::new();
+        let initial = case.current(&case.initial, &whole);
         let start = values(&case.measures, &initial, 0.0)?;
         Self::at(case, device, start, Vec::new(), None)
     }
@@ -261,11 +258,7 @@ impl<const D: usize> Run<D> {
 
     /// The phase field at the present time, as it is stored.
     pub fn current(&self) -> Current<'_, D> {
-        Current {
-            stored: self.stored(),
-            kept: self.case.kept(),
-            whole: &self.whole,
-        }
+        self.case.current(self.stored(), &self.whole)
     }
 
     /// The same without what a region keeps where nothing is stored.
@@ -275,11 +268,11 @@ impl<const D: usize> Run<D> {
 
     /// The `L2` distance of two phase fields of this run.
     fn distance(&self, a: &Stored<D>, b: &Stored<D>) -> f64 {
-        let kept = self.case.kept();
+        let [a, b] = [a, b].map(|stored| self.case.current(stored, &self.whole));
         l2_distance_of_parts(
             self.case.grid(),
-            &|start, part| kept.read(a, start, part),
-            &|start, part| kept.read(b, start, part),
+            &|start, part| a.read(start, part),
+            &|start, part| b.read(start, part),
         )
     }
 
