@@ -1,5 +1,6 @@
 //! Where in its time steps a flow is.
 
+use geometry::positive;
 use solver::StepRecord;
 
 use crate::control::Controller;
@@ -66,7 +67,7 @@ impl StepControl {
             controller: controller.transpose()?,
             due: f64::INFINITY,
         };
-        control.begin(f64::INFINITY)?;
+        control.begin(steps.first_substep.unwrap_or(f64::INFINITY))?;
         Ok(control)
     }
 
@@ -74,17 +75,11 @@ impl StepControl {
     fn begin(&mut self, substep: f64) -> Result<(), Error> {
         self.size = self.wanted.min(self.end - self.time);
         self.due = self.time + self.size;
-        let first_substep = self.steps.first_substep;
         // At the end nothing is left to make.
         let substeps = self.controller.is_none() && self.size > 0.0;
-        if let Some(very_first) = first_substep.filter(|_| substeps) {
-            let largest = if self.completed == 0 {
-                very_first
-            } else {
-                self.size
-            };
-            let first = substep.min(largest);
-            let least = first.min(very_first).min(self.size);
+        if let Some(very_first) = self.steps.first_substep.filter(|_| substeps) {
+            let first = substep.min(self.size);
+            let least = first.min(positive("first substep", very_first)?);
             self.substeps = Some(Substeps::new(self.size, first, least)?);
         }
         Ok(())
@@ -114,12 +109,9 @@ impl StepControl {
 
     /// How often that size may be halved where a minimization fails.
     pub(crate) fn halvings(&self) -> u32 {
-        match (self.steps.rule, self.substeps) {
-            (_, Some(substeps)) => substeps.halvings(),
-            (StepRule::ByEnergy(_), None) => HALVINGS,
-            _ if self.controller.is_some() => HALVINGS,
-            _ => 0,
-        }
+        let adapts = matches!(self.steps.rule, StepRule::ByEnergy(_)) || self.controller.is_some();
+        let of_steps = if adapts { HALVINGS } else { 0 };
+        (self.substeps).map_or(of_steps, |substeps| substeps.halvings())
     }
 
     /// How often a step may be halved that moves the interface too far, or cannot hold what it is to hold. Substeps have a smallest size, of which
@@ -141,10 +133,7 @@ impl StepControl {
         let mut substep = f64::INFINITY;
         if let Some(controller) = &mut self.controller {
             controller.accept(record);
-            if self.due.is_finite()
-                && self.due - self.time > 1e-12 * self.due
-                && self.wanted.is_finite()
-            {
+            if self.wanted.is_finite() && self.due - self.time > 1e-12 * self.due {
                 return Ok(false);
             }
         }
