@@ -71,7 +71,5 @@ pub enum Error {
     #[error(transparent)]
     Solver(#[from] solver::Error),
     #[error(transparent)]
-    Operators(#[from] operators::Error),
-    #[error(transparent)]
     Geometry(#[from] geometry::Error),
 }
