@@ -25,13 +25,6 @@ impl Seal {
             sha256: hexadecimal(hash.finish()),
         })
     }
-
-    pub fn check(&self, path: &Path) -> Result<(), Error> {
-        let found = Self::of(path)?;
-        (found == *self)
-            .then_some(())
-            .ok_or_else(|| wrong_checksum(path))
-    }
 }
 
 pub(crate) fn wrong_checksum(path: &Path) -> Error {
