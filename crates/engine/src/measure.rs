@@ -7,7 +7,7 @@ use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, PhaseField, ZeroSet, distance_from_phase_field};
 
-use crate::{Current, Error, Held};
+use crate::{Current, Error, Held, Values};
 
 /// The name of a measure of how far the surface has gone since the beginning, a length in the box.
 pub const DISPLACEMENT: &str = "displacement";
@@ -127,13 +127,23 @@ impl<const D: usize> Measure<D> {
         self.names.iter().map(String::as_str)
     }
 
-    /// Their values, with the names of those that the shape has.
-    pub(crate) fn of(
-        &self,
+    /// The values of all those that the shape has, at a time.
+    pub(crate) fn values(
+        measures: &[Self],
         now: &Current<'_, D>,
         time: f64,
-    ) -> Result<impl Iterator<Item = (&str, f64)>, Error> {
-        let values = self.names().zip((self.of)(now, time)?);
-        Ok(values.filter_map(|(name, value)| Some((name, value?))))
+    ) -> Result<Values, Error> {
+        let mut values = Values::new();
+        for measure in measures {
+            let measured = measure.names.iter().cloned().zip((measure.of)(now, time)?);
+            values.extend(measured.filter_map(|(name, value)| Some((name, value?))));
+        }
+        match values.iter().find(|(_, value)| !value.is_finite()) {
+            Some((name, &value)) => {
+                let name = name.clone();
+                Err(Error::NonFinite { name, value, time })
+            }
+            None => Ok(values),
+        }
     }
 }

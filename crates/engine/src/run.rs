@@ -44,7 +44,7 @@ impl<const D: usize> Run<D> {
         case.initial.check_finite()?;
         let whole = OnceLock::new();
         let initial = case.current(&case.initial, &whole);
-        let start = values(&case.measures, &initial, 0.0)?;
+        let start = Measure::values(&case.measures, &initial, 0.0)?;
         Self::at(case, device, start, Vec::new(), None)
     }
 
@@ -117,7 +117,7 @@ impl<const D: usize> Run<D> {
         record.travelled = self.distance(&now, &self.case.initial);
         self.stored = Some(now);
         record.seconds = clock.elapsed().as_secs_f64();
-        record.measures = values(&self.case.measures, &self.current(), record.time)?;
+        record.measures = Measure::values(&self.case.measures, &self.current(), record.time)?;
         record.completes_step = self.control.accept(&record)?;
         self.records.push(record);
         self.torn = false;
@@ -319,23 +319,3 @@ impl<const D: usize> Run<D> {
 
 /// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
 const FAR: f64 = 0.6;
-
-/// The measures of a phase field at a time.
-fn values<const D: usize>(
-    measures: &[Measure<D>],
-    now: &Current<'_, D>,
-    time: f64,
-) -> Result<Values, Error> {
-    let mut values = Values::new();
-    for measure in measures {
-        let measured = measure.of(now, time)?;
-        values.extend(measured.map(|(name, value)| (name.to_owned(), value)));
-    }
-    match values.iter().find(|(_, value)| !value.is_finite()) {
-        Some((name, &value)) => {
-            let name = name.clone();
-            Err(Error::NonFinite { name, value, time })
-        }
-        None => Ok(values),
-    }
-}
