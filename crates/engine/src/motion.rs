@@ -223,7 +223,6 @@ fn learned<const D: usize>(
     let mut flow = match case.operator.storage {
         Storage::Dense => dense()?,
         Storage::Bricks => bricks()?,
-        Storage::Auto if !case.takes_bricks() => dense_instead()?,
         Storage::Auto => match bricks() {
             Ok(flow) if (flow.stored_cells() as f64) < PAYS * case.grid().len() as f64 => flow,
             Ok(_) | Err(Model(_) | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
