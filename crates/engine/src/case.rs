@@ -108,16 +108,6 @@ impl<const D: usize> Case<D> {
         Ok(FiniteElementStep::implicit(self.grid(), eps, mcf_step)?)
     }
 
-    /// The largest time step by the energy, `side^4 / 1024`: in such times shapes as large as the box become stationary.
-    pub(crate) fn largest_step(&self) -> f64 {
-        self.grid().side().powi(4) / 1024.0
-    }
-
-    /// An energy below that of any closed curve in the box, or surface: changes of smaller ones are measured by it.
-    pub(crate) fn least_energy(&self) -> f64 {
-        self.grid().side().powi(D as i32 - 3)
-    }
-
     /// Whether it can be had on active bricks, if the network's kernel is separable.
     pub(crate) fn takes_bricks(&self) -> bool {
         self.flow == Flow::Willmore && self.operator.network().is_some()

@@ -232,8 +232,6 @@ impl<const D: usize> Run<D> {
             current: self.current(),
             steps: self.steps(),
             step_size: self.control.last_size,
-            largest_step: case.largest_step(),
-            least_energy: case.least_energy(),
             is_willmore: case.energy.is_willmore(),
         };
         let driven = !case.held.is_reached(self.control.gone);

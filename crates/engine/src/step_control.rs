@@ -4,6 +4,7 @@ use geometry::positive;
 use solver::StepRecord;
 
 use crate::control::Controller;
+use crate::steps::{largest_step, least_energy};
 use crate::substeps::{EASY, HARD, Substeps};
 use crate::{Case, Error, ErrorControl, Order, Record, StepRule, TimeSteps};
 
@@ -45,7 +46,7 @@ pub(crate) struct StepControl {
 
 impl StepControl {
     pub(crate) fn new<const D: usize>(case: &Case<D>) -> Result<Self, Error> {
-        let (steps, largest) = (case.steps, case.largest_step());
+        let (steps, largest) = (case.steps, largest_step(case.grid()));
         let rule = steps.rule.resolved(case.scales.mcf_step);
         let control = match steps.order {
             Order::Controlled(control) => Some(control),
@@ -56,7 +57,7 @@ impl StepControl {
             steps: TimeSteps { rule, ..steps },
             end: case.end().unwrap_or(f64::INFINITY),
             largest,
-            least_energy: case.least_energy(),
+            least_energy: least_energy(case.grid()),
             completed: 0,
             time: 0.0,
             gone: 0.0,

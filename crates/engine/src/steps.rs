@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use geometry::Grid;
 use serde::{Serialize, Serializer};
 
 use crate::ErrorControl;
@@ -71,6 +72,16 @@ impl StepRule {
             }
         }
     }
+}
+
+/// The largest time step by the energy, `side^4 / 1024`: in such times shapes as large as the box become stationary.
+pub(crate) fn largest_step<const D: usize>(grid: &Grid<D>) -> f64 {
+    grid.side().powi(4) / 1024.0
+}
+
+/// An energy below that of any closed curve in the box, or surface: changes of smaller ones are measured by it.
+pub(crate) fn least_energy<const D: usize>(grid: &Grid<D>) -> f64 {
+    grid.side().powi(D as i32 - 3)
 }
 
 /// How the time of a flow is divided into steps.

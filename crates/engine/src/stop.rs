@@ -8,6 +8,7 @@ use geometry::{PhaseField, Stored};
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
 
+use crate::steps::{largest_step, least_energy};
 use crate::{Current, DISPLACEMENT, Record};
 
 /// A reason to end; a flow ends with the first that holds.
@@ -62,10 +63,6 @@ pub(crate) struct Progress<'a, const D: usize> {
     pub(crate) steps: usize,
     /// Size of the time step of the last record.
     pub(crate) step_size: f64,
-    /// The largest time step by the energy.
-    pub(crate) largest_step: f64,
-    /// What changes of energies below it are measured by.
-    pub(crate) least_energy: f64,
     /// Whether the energy is the bending energy alone.
     pub(crate) is_willmore: bool,
 }
@@ -129,8 +126,9 @@ impl Stop {
 impl<const D: usize> Progress<'_, D> {
     /// Whether a step that is nearly as long as steps by the energy can be changed the energy by almost nothing.
     fn is_at_rest(&self, record: &Record) -> bool {
-        let change = |made: StepRecord| made.relative_drop(self.least_energy).abs();
-        let is_long = record.tau >= 0.25 * self.largest_step;
+        let grid = self.initial.grid();
+        let change = |made: StepRecord| made.relative_drop(least_energy(grid)).abs();
+        let is_long = record.tau >= 0.25 * largest_step(grid);
         let made = record.minimization;
         is_long && made.is_some_and(|made| change(made) < LITTLE)
     }
