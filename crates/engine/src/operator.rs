@@ -5,7 +5,7 @@ use std::sync::Arc;
 use derive_more::Display;
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::Grid;
-use model::{NamedNetwork, NeededNetwork, Networks, Shipped};
+use model::{Calibration, NamedNetwork, NeededNetwork, Networks, Shipped};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use solver::{Factors, NewtonParams};
@@ -191,27 +191,18 @@ impl Operator {
     ///
     /// # Errors
     /// [`Error::Model`] if the step cannot be calibrated.
-    pub fn learned(scheme: Scheme, network: NamedNetwork) -> Result<Self, Error> {
-        let NamedNetwork { name, network } = network;
-        let (factors, response) = match scheme {
-            Scheme::Paper => (Factors::PAPER, 1.0),
-            Scheme::Calibrated | Scheme::Accurate => {
-                let calibration = network.calibration()?;
-                (calibration.factors, calibration.response())
-            }
-        };
-        let network = match scheme {
+    pub fn learned(scheme: Scheme, mut named: NamedNetwork) -> Result<Self, Error> {
+        let mut operator = Self::plain(Method::Hybrid, scheme);
+        if scheme != Scheme::Paper {
+            operator.calibrate(&named.network.calibration()?);
+        }
+        if scheme == Scheme::Calibrated {
             // The odd part has the same factors to first order in its difference to the whole.
-            Scheme::Calibrated => network.odd_part(),
-            Scheme::Paper | Scheme::Accurate => network,
-        };
-        Ok(Self {
-            factors,
-            response,
-            half_grids: true,
-            network: Some(Arc::new(NamedNetwork { name, network })),
-            ..Self::plain(Method::Hybrid, scheme)
-        })
+            named.network = named.network.odd_part();
+        }
+        operator.half_grids = true;
+        operator.network = Some(Arc::new(named));
+        Ok(operator)
     }
 
     /// Finite elements on grids like this one.
@@ -230,10 +221,13 @@ impl Operator {
         assert!(!method.is_learned(), "a learned operator needs a network");
         let mut operator = Self::plain(method, scheme);
         if scheme != Scheme::Paper {
-            let calibration = operator.elements(grid, scales)?.calibrate()?;
-            (operator.factors, operator.response) = (calibration.factors, calibration.response());
+            operator.calibrate(&operator.elements(grid, scales)?.calibrate()?);
         }
         Ok(operator)
+    }
+
+    fn calibrate(&mut self, calibration: &Calibration) {
+        (self.factors, self.response) = (calibration.factors, calibration.response());
     }
 
     /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
