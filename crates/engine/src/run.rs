@@ -76,8 +76,8 @@ impl<const D: usize> Run<D> {
         }
         let (motion, elements) = motion::of(&case, state, device)?;
         // Before the first step all of the initial values count, also where they are not stored.
-        let begun = state.filter(|_| !records.is_empty());
-        let stored = begun.map(|_| motion.stored()).transpose()?;
+        let begun = !records.is_empty();
+        let stored = begun.then(|| motion.stored()).transpose()?;
         let mut run = Self {
             motion,
             elements,
