@@ -267,24 +267,18 @@ fn restore<const D: usize>(
 }
 
 /// Refuses a stored run of another case, and says in what it differs.
-pub(crate) fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), Error> {
+fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), Error> {
     let found = &stored.state().notes["case"];
     if found == wanted {
         return Ok(());
     }
     let keys = [wanted, found].into_iter().filter_map(Value::as_object);
     let keys: BTreeSet<&String> = keys.flat_map(|map| map.keys()).collect();
-    let differing: Vec<String> = keys
-        .into_iter()
-        .map(|key| (key, &found[key], &wanted[key]))
-        .filter(|(_, there, here)| there != here)
-        .map(|(key, there, here)| format!("{key}: {there} there, {here} here"))
-        .collect();
-    let differing = differing.join("; ");
-    Err(refused(
-        stored,
-        format!("it is of another case ({differing}); start a new run in another folder"),
-    ))
+    let keys = keys.into_iter().filter(|key| found[key] != wanted[key]);
+    let differing = keys.map(|key| format!("{key}: {} there, {} here", found[key], wanted[key]));
+    let differing = differing.collect::<Vec<_>>().join("; ");
+    let reason = format!("it is of another case ({differing}); start a new run in another folder");
+    Err(refused(stored, reason))
 }
 
 fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
