@@ -244,10 +244,7 @@ fn restore<const D: usize>(
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
     let optional = |name: &str| state.array(name).map(<[f64]>::to_vec);
-    let previous = match optional("previous") {
-        Some(previous) => Some((previous, read(stored, &state.notes["previous_tau"])?)),
-        None => None,
-    };
+    let previous_tau: Option<f64> = read(stored, &state.notes["previous_tau"])?;
     let (mut half_motions, mut half) = (Vec::new(), grid);
     while let Some(motion) = optional(&half_motion(half_motions.len())) {
         half = half.half()?;
@@ -256,7 +253,7 @@ fn restore<const D: usize>(
     let at = FlowState {
         bricks: bricks(stored, "bricks", &grid)?,
         current: values(stored, "current")?,
-        previous,
+        previous: optional("previous").zip(previous_tau),
         rate: optional("rate"),
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
