@@ -108,16 +108,6 @@ impl<const D: usize> Case<D> {
         Ok(FiniteElementStep::implicit(self.grid(), eps, mcf_step)?)
     }
 
-    /// Whether it can be had on active bricks, if the network's kernel is separable.
-    pub(crate) fn takes_bricks(&self) -> bool {
-        self.flow == Flow::Willmore && self.operator.network().is_some()
-    }
-
-    /// The time at which the flow ends, if there is one.
-    pub(crate) fn end(&self) -> Option<f64> {
-        Stop::end(&self.stops)
-    }
-
     /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums, and measures by their names.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();

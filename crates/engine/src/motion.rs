@@ -120,8 +120,17 @@ pub(crate) fn of<const D: usize>(
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
 ) -> Result<Made<D>, Error> {
-    let (nodes, takes_bricks) = (case.grid().len(), case.takes_bricks());
-    let whole = !takes_bricks || case.operator.storage == Storage::Dense;
+    let (nodes, storage) = (case.grid().len(), case.operator.storage);
+    let needs_grid = match (case.flow, case.operator.method) {
+        (Flow::Willmore, Method::Hybrid) => None,
+        (Flow::MeanCurvature, _) => Some("mean curvature flows"),
+        (Flow::Willmore, _) => Some("finite elements"),
+    };
+    if let Some(what) = needs_grid.filter(|_| storage == Storage::Bricks) {
+        return Err(solver::Error::NeedsGrid { what }.into());
+    }
+    let takes_bricks = needs_grid.is_none();
+    let whole = !takes_bricks || storage == Storage::Dense;
     if whole {
         check_memory(case, device, nodes, takes_bricks)?;
     }
@@ -153,14 +162,6 @@ fn make<const D: usize>(
     device: &ComputeDevice,
 ) -> Result<Made<D>, Error> {
     let (params, operator) = (case.params(), &case.operator);
-    let whole = match (case.flow, operator.method) {
-        (Flow::Willmore, Method::Hybrid) => None,
-        (Flow::MeanCurvature, _) => Some("mean curvature flows"),
-        (Flow::Willmore, _) => Some("finite elements"),
-    };
-    if let Some(what) = whole.filter(|_| operator.storage == Storage::Bricks) {
-        return Err(solver::Error::NeedsGrid { what }.into());
-    }
     let elements = match operator.network() {
         Some(_) => None,
         None => Some(operator.elements(case.grid(), &case.scales)?),

@@ -6,7 +6,7 @@ use solver::StepRecord;
 use crate::control::Controller;
 use crate::steps::{largest_step, least_energy};
 use crate::substeps::{EASY, HARD, Substeps};
-use crate::{Case, Error, ErrorControl, Order, Record, StepRule, TimeSteps};
+use crate::{Case, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps};
 
 /// Steps by the energy grow while they take away less than this fraction of it,
 const LITTLE: f64 = 0.1;
@@ -55,7 +55,7 @@ impl StepControl {
         let controller = control.map(|control| Controller::new(control, case.scales.eps, largest));
         let mut control = Self {
             steps: TimeSteps { rule, ..steps },
-            end: case.end().unwrap_or(f64::INFINITY),
+            end: Stop::end(&case.stops).unwrap_or(f64::INFINITY),
             largest,
             least_energy: least_energy(case.grid()),
             completed: 0,

@@ -96,7 +96,7 @@ impl Store {
         ends: impl Fn(&str) -> bool,
     ) -> Result<(Self, Run<D>), Error> {
         let stops: Vec<Stop> = read(&stored, &stored.state().notes["case"]["stops"])?;
-        let [old, new] = [Stop::end(&stops), case.end()].map(|end| end.map(f64::to_bits));
+        let [old, new] = [&stops, &case.stops].map(|stops| Stop::end(stops).map(f64::to_bits));
         // Steps of mean curvature flow have one size.
         if case.flow == Flow::Willmore && old.is_some() && old != new {
             let reason = "steps may have been cut short for another end time".to_owned();
