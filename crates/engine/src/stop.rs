@@ -89,17 +89,15 @@ impl Stop {
 
     pub(crate) fn holds<const D: usize>(&self, flow: &Progress<'_, D>) -> bool {
         let last = flow.records.last();
+        let energy = last.and_then(Record::willmore_energy);
         match *self {
             Self::Steps(steps) => flow.steps >= steps,
             // What is left of a sum of steps after the last one is rounding.
             Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
-            Self::Energy(energy) => {
-                (last.and_then(Record::willmore_energy)).is_some_and(|w| w <= energy)
-            }
+            Self::Energy(target) => energy.is_some_and(|energy| energy <= target),
             Self::EnergyRatio(ratio) => {
                 let first = flow.records.first().and_then(Record::energy_at_rest);
-                let last = last.and_then(Record::willmore_energy);
-                (first.zip(last)).is_some_and(|(first, last)| last <= ratio * first)
+                (first.zip(energy)).is_some_and(|(first, energy)| energy <= ratio * first)
             }
             Self::Displacement(length) => {
                 let gone = last.and_then(|record| record.measure(DISPLACEMENT));
@@ -113,7 +111,6 @@ impl Stop {
                 last.is_some_and(|records| records.iter().all(|record| flow.is_at_rest(record)))
             }
             Self::NoSurface => {
-                let energy = last.and_then(Record::willmore_energy);
                 let is_low = energy.is_some_and(|energy| energy < 4.0 * PI);
                 D == 3 && flow.is_willmore && is_low && !is_near_side(flow.initial)
             }
