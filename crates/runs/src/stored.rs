@@ -52,24 +52,17 @@ impl StoredRun {
         commits(&path)?;
         let lock = lock::lock(&*storage, &path)?;
         let mut steps = commits(&path)?;
-        let checked = check(&path, &mut steps);
-        let recovered = matches!(checked, Err(Error::Damaged { .. }));
-        let ((header, state), timings) = match checked {
-            Err(Error::Damaged {
-                path: file, what, ..
-            }) => {
-                let intact = steps.iter().find_map(|&step| intact(&path, step).ok());
-                let fallback = intact.as_ref().map(|(_, state)| state.step);
-                steps.retain(|&step| Some(step) == fallback);
-                let intact = intact.filter(|_| recover).ok_or(Error::Damaged {
-                    path: file,
-                    what,
-                    fallback,
-                })?;
-                (intact, timings::read(&path).unwrap_or_default())
+        let (mut checked, mut recovered) = (check(&path, &mut steps), false);
+        if let Err(Error::Damaged { fallback, .. }) = &mut checked {
+            let intact = steps.iter().find_map(|&step| intact(&path, step).ok());
+            *fallback = intact.as_ref().map(|(_, state)| state.step);
+            if let Some(intact) = intact.filter(|_| recover) {
+                steps = vec![intact.1.step];
+                recovered = true;
+                checked = Ok((intact, timings::read(&path).unwrap_or_default()));
             }
-            checked => checked?,
-        };
+        }
+        let ((header, state), timings) = checked?;
         Ok(Self {
             leftovers: folder::others(&path, &header.files, &steps)?,
             finished: header.finished,
