@@ -74,8 +74,7 @@ pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Method, Operator, Scales, Scheme, quarter_square};
 pub use record::{
-    Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, to_csv,
-    total_hvp,
+    Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, total_hvp,
 };
 pub use run::Run;
 pub use solver::Helfrich;

@@ -111,7 +111,7 @@ pub fn mean_hvp(records: &[Record]) -> f64 {
 }
 
 /// All records as CSV, with a column for each measure.
-pub fn to_csv(records: &[Record]) -> String {
+pub(crate) fn to_csv(records: &[Record]) -> String {
     type Column<'a> = (&'a str, Box<dyn Fn(&Record) -> Option<f64> + 'a>);
     fn column<'a>(name: &'a str, of: impl Fn(&Record) -> Option<f64> + 'a) -> Column<'a> {
         (name, Box::new(of))
