@@ -120,7 +120,7 @@ pub(crate) fn of<const D: usize>(
     state: Option<&FlowState<D>>,
     device: &ComputeDevice,
 ) -> Result<Made<D>, Error> {
-    let (nodes, storage) = (case.grid().len(), case.operator.storage);
+    let (kind, grid, storage) = (device.kind(), case.grid(), case.operator.storage);
     let needs_grid = match (case.flow, case.operator.method) {
         (Flow::Willmore, Method::Hybrid) => None,
         (Flow::MeanCurvature, _) => Some("mean curvature flows"),
@@ -132,28 +132,16 @@ pub(crate) fn of<const D: usize>(
     let takes_bricks = needs_grid.is_none();
     let whole = !takes_bricks || storage == Storage::Dense;
     if whole {
-        check_memory(case, device, nodes, takes_bricks)?;
+        Storage::check(kind, case.flow, grid, grid.len(), takes_bricks)?;
     }
     let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
     let made = make.expect("a case is in the plane or in space")(case, state, device)?;
     if !whole {
         // How many cells are stored is known only now; little is allocated yet.
-        check_memory(case, device, made.0.stored_cells().unwrap_or(nodes), true)?;
+        let stored = made.0.stored_cells().unwrap_or(grid.len());
+        Storage::check(kind, case.flow, grid, stored, true)?;
     }
     Ok(made)
-}
-
-/// Refuses a flow of which so many cells are stored if the memory of the CPU is too small for it.
-fn check_memory<const D: usize>(
-    case: &Case<D>,
-    device: &ComputeDevice,
-    stored: usize,
-    takes_bricks: bool,
-) -> Result<(), Error> {
-    if device.kind().is_cpu() {
-        Storage::check(case.flow, case.grid(), stored, takes_bricks)?;
-    }
-    Ok(())
 }
 
 fn make<const D: usize>(
@@ -218,7 +206,8 @@ fn learned<const D: usize>(
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     // Where bricks are no alternative.
     let dense_instead = || -> Result<_, Error> {
-        check_memory(case, device, case.grid().len(), false)?;
+        let grid = case.grid();
+        Storage::check(device.kind(), case.flow, grid, grid.len(), false)?;
         Ok(dense()?)
     };
     let mut flow = match case.operator.storage {
