@@ -25,8 +25,8 @@ impl<'a, const D: usize> Current<'a, D> {
         })
     }
 
-    /// Writes the values of the whole grid from a node on, whole rows of bricks: those that are stored, and outside of the region the initial
-    /// ones, which it keeps even where nothing is stored.
+    /// Writes the values of the whole grid from a node on, whole rows of bricks: those that are stored, and outside of the region the
+    /// initial ones, which it keeps even where nothing is stored.
     pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
         self.stored.read(start, part);
         if let Some(region) = self.region {
