@@ -40,8 +40,8 @@ impl Storage {
         each * stored as f64
     }
 
-    /// Refuses a flow of which so many cells of a grid are stored if the memory of the CPU is too small for it. Limits of containers are not
-    /// looked at.
+    /// Refuses a flow of which so many cells of a grid are stored if the memory of the CPU is too small for it. Limits of containers are
+    /// not looked at.
     pub(crate) fn check<const D: usize>(
         device: DeviceKind,
         flow: Flow,
