@@ -83,30 +83,18 @@ impl Files<'_> {
 
     fn drawings(&self) -> Result<Option<Markup>> {
         // Images are repaired in their own tones.
-        let (before, format) = if self.has(plane::ORIGINAL) {
-            (plane::ORIGINAL.trim_end_matches(".png"), "png")
-        } else {
-            (presentation::START, "svg")
-        };
-        let stages = self.stages(before, &[format]);
+        let is_repaired = self.has(plane::ORIGINAL);
+        let stages = self.stages(&[if is_repaired { "png" } else { "svg" }]);
         let mut drawings = Vec::new();
         for (label, name) in thinned(&stages, MOST_FRAMES) {
-            if let Some(bytes) = self.read(name)? {
-                drawings.push((label.clone(), Image::from_bytes(name, &bytes)?));
-            }
+            let image = Image::from_bytes(name, &self.run.read(name)?)?;
+            drawings.push((label.clone(), image));
         }
         Ok((!drawings.is_empty()).then(|| frames("The shape over the steps", &drawings)))
     }
 
     fn surfaces(&self) -> Result<Option<Markup>> {
-        // Where the vertices of a mesh follow the flow, it is itself the shape at the beginning.
-        let is_own = (self.run.files()).any(|name| name.starts_with(own::INPUT));
-        let before = if is_own {
-            own::INPUT
-        } else {
-            presentation::START
-        };
-        let stages = self.stages(before, &MESHES);
+        let stages = self.stages(&MESHES);
         // Until it is started, and on paper, the viewer is a picture.
         let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
         else {
@@ -128,7 +116,7 @@ impl Files<'_> {
     }
 
     /// Labels and files of the shape before, in the frames between, and after, each in the first of these formats that it has.
-    fn stages(&self, before: &str, formats: &[&str]) -> Vec<(String, String)> {
+    fn stages(&self, formats: &[&str]) -> Vec<(String, String)> {
         let named = |label: &str, stem: &str| {
             let mut names = formats.iter().map(|format| format!("{stem}.{format}"));
             let name = names.find(|name| self.has(name));
@@ -143,7 +131,10 @@ impl Files<'_> {
         }
         let frame = |step| named(&format!("step {step}"), &presentation::frame(step));
         let frames = steps.into_iter().filter_map(frame);
-        let before = named("before", before);
+        // An image that is repaired and a mesh whose vertices follow the flow are themselves the shape at the beginning.
+        let original = plane::ORIGINAL.trim_end_matches(".png");
+        let mut before = [original, own::INPUT, presentation::START].into_iter();
+        let before = before.find_map(|stem| named("before", stem));
         before.into_iter().chain(frames).chain(after).collect()
     }
 
