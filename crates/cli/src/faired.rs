@@ -42,8 +42,7 @@ impl Faired {
     pub fn write(&self, path: &Path) -> Result<()> {
         let same = |(format, _): &&(String, _)| extension(path) == *format;
         if let Some((_, bytes)) = self.file.as_ref().filter(same) {
-            let written = files::write_atomically(path, |out| out.write_all(bytes));
-            return Ok(written.map_err(geometry::Error::from)?);
+            return Ok(files::write_atomically(path, |out| out.write_all(bytes))?);
         }
         Ok(surfaces::write(path, &self.mesh)?)
     }
@@ -70,10 +69,8 @@ pub fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Val
     };
     let squares: f64 = lengths.iter().map(|length| length * length).sum();
     let largest = lengths.iter().copied().fold(0.0, f64::max);
-    add(
-        "displacement_rms",
-        (squares / lengths.len().max(1) as f64).sqrt(),
-    );
+    let mean = squares / lengths.len().max(1) as f64;
+    add("displacement_rms", mean.sqrt());
     add("displacement_largest", largest);
     // A mesh that folds over itself is written all the same, and has no distance.
     if let Ok((after, _)) = ClosedMesh::new(after.clone()) {

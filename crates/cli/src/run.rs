@@ -373,14 +373,12 @@ fn estimates(record: &Record) -> Option<StepEstimates> {
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
 /// and the longest displacement of a stage in interface widths.
 fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
-    let estimates: Vec<StepEstimates> = records.iter().filter_map(estimates).collect();
-    if estimates.is_empty() {
-        return None;
-    }
-    let longest = estimates.iter().map(|e| e.displacement).fold(0.0, f64::max);
+    let estimates = records.iter().filter_map(estimates);
+    let longest = estimates.clone().map(|e| e.displacement);
+    let longest = longest.reduce(f64::max)?;
     Some(json!({
         "estimated_error": estimated_time_error(records),
-        "path": estimates.iter().map(|e| e.motion).sum::<f64>(),
+        "path": estimates.map(|e| e.motion).sum::<f64>(),
         "longest_displacement_in_widths": longest / eps,
     }))
 }

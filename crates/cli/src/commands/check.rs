@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use chacha20::ChaCha8Rng;
 use linearize::taylor::{halvings, remainder};
-use model::{Factors, MeanCurvatureOperator, Network};
+use model::{MeanCurvatureOperator, Network};
 use operators::{add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
 use solver::{FlowParams, MinimizingMovement, Objective};
@@ -62,12 +62,7 @@ fn findings<const D: usize>(
     let (scales, operator) = options.scheme.operator(Method::Hybrid, field.grid())?;
     let network = operator.network();
     let network = &network.expect("a learned operator has one").network;
-    let params = FlowParams {
-        eps: scales.eps,
-        mcf_step: scales.mcf_step,
-        newton: scales.newton,
-        calibration: Factors::PAPER,
-    };
+    let params = FlowParams::paper(scales.eps, scales.mcf_step);
     let at = |device: &_| derivatives(field, network, &params, options.common.seed, device);
     let here = at(device)?;
     let mut findings = Vec::new();
@@ -148,10 +143,8 @@ fn derivatives<const D: usize>(
     energy.set(&previous, params.stiffness(params.mcf_step))?;
     let u = add_scaled(previous, &moved, 0.1);
     let (_, gradient) = energy.evaluate(&u)?;
-    let (hp, hq) = (
-        energy.hessian_vector_product(&p)?,
-        energy.hessian_vector_product(&q)?,
-    );
+    let hp = energy.hessian_vector_product(&p)?;
+    let hq = energy.hessian_vector_product(&q)?;
     let dot = |a: &_, b: &_| device.scalar(inner_product::<D>(a, b));
     let (pq, qp) = (dot(&p, &hq)?, dot(&q, &hp)?);
     let scale = (dot(&p, &hp)?.abs() * dot(&q, &hq)?.abs()).sqrt();

@@ -1,7 +1,7 @@
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
-use model::training::{Checkpoint, Progress, SphereData, Trained, Training};
+use model::training::{Checkpoint, Progress, SphereData, Training};
 
 use crate::case::check_eps_over_h;
 use crate::cli::{MessageOptions, TrainOptions};
@@ -20,13 +20,12 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     };
     let eps_over_h = options.eps_over_h.ok_or_else(|| missing("eps-over-h"))?;
     check_eps_over_h(eps_over_h)?;
+    let usual_step = quarter_square(eps_over_h);
     let ratios = Ratios {
         dimension: options.dimension.ok_or_else(|| missing("dimension"))?,
         width: options.width.ok_or_else(|| missing("width"))?,
         eps_over_h,
-        step_over_h2: options
-            .step_over_h2
-            .unwrap_or_else(|| quarter_square(eps_over_h)),
+        step_over_h2: options.step_over_h2.unwrap_or(usual_step),
     };
     ratios.validate()?;
     let save = options.save.as_ref().ok_or_else(|| missing("save"))?;
@@ -56,23 +55,19 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     if let Err(model::Error::Interrupted { .. }) = &trained {
         messages.warn("interrupted: nothing of the training is kept");
     }
-    let Trained {
-        network, quality, ..
-    } = trained?;
-    let calibration = network.calibration()?;
-    network.save(save)?;
+    let trained = trained?;
+    let loss = trained.quality.held_out_loss;
+    let calibration = trained.network.calibration()?;
+    trained.network.save(save)?;
     let outcome = json!({
         "command": "train",
         "file": save.to_string_lossy(),
         "ratios": ratios,
-        "held_out_loss": quality.held_out_loss,
+        "held_out_loss": loss,
         "calibration": calibration,
     });
-    let text = format!(
-        "{ratios}: held-out loss {:.2e}; written to {}",
-        quality.held_out_loss,
-        save.display()
-    );
+    let shown = save.display();
+    let text = format!("{ratios}: held-out loss {loss:.2e}; written to {shown}");
     messages.report(&outcome, &text);
     Ok(())
 }
