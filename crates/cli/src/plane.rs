@@ -88,16 +88,15 @@ impl Original {
             let around = self.tone(drawing, opacity);
             around.unwrap_or_else(|| weighted([usual, usual, usual, 255.0]))
         });
-        let mixed = |(k, own): (usize, &[u8; 4])| {
-            if !self.drawn[k] {
-                return *own;
-            }
-            let part = f64::from(drawing.pixels()[k][3]) / 255.0;
+        let mut pixels = self.picture.pixels().to_vec();
+        let drawn = pixels.iter_mut().zip(drawing.pixels()).zip(&self.drawn);
+        for ((pixel, inside), _) in drawn.filter(|(_, drawn)| **drawn) {
+            let part = f64::from(inside[3]) / 255.0;
             let [r, g, b, opacity] = [0, 1, 2, 3].map(|c| part * ink[c] + (1.0 - part) * paper[c]);
-            [r / opacity, g / opacity, b / opacity, opacity].map(|value| value.round() as u8)
-        };
-        let pixels = self.picture.pixels().iter().enumerate().map(mixed);
-        Ok(Picture::new(self.picture.size(), pixels.collect())?)
+            let colour = [r / opacity, g / opacity, b / opacity, opacity];
+            *pixel = colour.map(|value| value.round() as u8);
+        }
+        Ok(Picture::new(self.picture.size(), pixels)?)
     }
 
     /// The [weighted] mean of the pixels outside of the mask where the drawing has this opacity: those near the mask, or else all of them.
@@ -166,14 +165,12 @@ impl Presentation<2> for Plane {
     }
 
     fn save(&self, u: &Stored<2>, eps: f64, path: &Path) -> Result<()> {
-        match &*extension(path) {
-            "svg" => {
-                let text = images::svg(&self.frame, &Outline::of_phase_field(&u.field()?)?);
-                files::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
-            }
-            _ => self.picture(u, u, eps)?.write_png(path)?,
+        if extension(path) != "svg" {
+            return Ok(self.picture(u, u, eps)?.write_png(path)?);
         }
-        Ok(())
+        let text = images::svg(&self.frame, &Outline::of_phase_field(&u.field()?)?);
+        let written = files::write_atomically(path, |out| out.write_all(text.as_bytes()));
+        Ok(written?)
     }
 
     fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
