@@ -636,17 +636,15 @@ impl<'a> Reader<'a> {
 
 /// How far the surface of a phase field is from a mesh, in words.
 fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>, field: &Stored<3>) -> String {
-    let Some(surface) = surface else {
-        let what = if has_interface(field) {
-            "one that touches itself"
-        } else {
-            "not there at all"
-        };
-        return what.to_owned();
-    };
-    let far = hausdorff_distance(surface, mesh);
-    let percent = 100.0 * far / mesh.bounding_box().longest_side();
-    format!("at most {far:.3e} ({percent:.3} % of the longest side) from that of the mesh")
+    match surface {
+        Some(surface) => {
+            let far = hausdorff_distance(surface, mesh);
+            let percent = 100.0 * far / mesh.bounding_box().longest_side();
+            format!("at most {far:.3e} ({percent:.3} % of the longest side) from that of the mesh")
+        }
+        None if has_interface(field) => "one that touches itself".to_owned(),
+        None => "not there at all".to_owned(),
+    }
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.

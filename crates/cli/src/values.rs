@@ -133,16 +133,14 @@ impl FromStr for Ansatz {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Ok(match text {
-            "keep" => Self::Keep,
-            "empty" => Self::Empty,
-            "full" => Self::Full,
-            text if Region::is_meant(text) => Self::Shape(text.parse()?),
-            text => {
-                return Err(format!(
-                    "{text:?} is no ansatz: give keep, empty, full, box:... or ball:..."
-                ));
-            }
-        })
+        match text {
+            "keep" => Ok(Self::Keep),
+            "empty" => Ok(Self::Empty),
+            "full" => Ok(Self::Full),
+            text if Region::is_meant(text) => text.parse().map(Self::Shape),
+            text => Err(format!(
+                "{text:?} is no ansatz: give keep, empty, full, box:... or ball:..."
+            )),
+        }
     }
 }

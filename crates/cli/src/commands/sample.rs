@@ -128,9 +128,7 @@ fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume> {
 fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<D>> {
     for region in regions {
         let hole = phase_field(*u.grid(), region.shape::<D>()?.as_ref(), eps(&u))?;
-        for (value, hole) in u.values_mut().iter_mut().zip(hole.values()) {
-            *value = value.min(-hole);
-        }
+        u = u.zip_map(&hole, |u, hole| u.min(-hole))?;
     }
     check_phases(&u, "what --without leaves")?;
     Ok(u)
