@@ -68,18 +68,12 @@ impl Keep {
         }
     }
 
-    /// Whether each node of a grid moves.
+    /// Whether each node of a grid moves: as the vertex that is nearest to it, where vertices are kept.
     pub fn moving_nodes(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
-        match self {
-            Self::Inside(shape) => (0..grid.len())
-                .map(|node| shape.signed_distance(grid.node(node)) > 0.0)
-                .collect(),
-            Self::At(_) => self.nearest_moves(grid, vertices),
+        if let Self::Inside(shape) = self {
+            let moves = |node| shape.signed_distance(grid.node(node)) > 0.0;
+            return (0..grid.len()).map(moves).collect();
         }
-    }
-
-    /// Whether the vertex that is nearest to a node moves.
-    fn nearest_moves(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
         let mut nearest = vec![(f64::INFINITY, true); grid.len()];
         let (spacing, last) = (grid.spacing(), grid.cells() as f64 - 1.0);
         for &x in vertices {

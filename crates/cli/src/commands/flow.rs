@@ -146,7 +146,17 @@ impl Job {
             round_edges(options, &mut start.initial, &self.device, self.messages)?;
         }
         let (case, presentation) = self.command.case(start)?;
-        let options = config::resolved(self.command.name(), &self.to_store())?;
+        // The options of which the same run can be made again.
+        let mut stored = self.command.clone();
+        // Standard output is not there any more when a run is resumed.
+        if self.messages.to_pipe {
+            stored.options().save = None;
+        }
+        // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
+        if matches!(&stored, RunCommand::Fair(fair) if !fair.ends) {
+            stored.options().steps = None;
+        }
+        let options = config::resolved(stored.name(), &stored)?;
         let plan = self.plan(presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
@@ -162,20 +172,6 @@ impl Job {
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
         plan.go_on(store, run)
-    }
-
-    /// The options of which the same run can be made again.
-    fn to_store(&self) -> RunCommand {
-        let mut command = self.command.clone();
-        // Standard output is not there any more when a run is resumed.
-        if self.messages.to_pipe {
-            command.options().save = None;
-        }
-        // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
-        if matches!(&command, RunCommand::Fair(fair) if !fair.ends) {
-            command.options().steps = None;
-        }
-        command
     }
 
     /// Continues a run from its last checkpoint, a finished one to more steps.
