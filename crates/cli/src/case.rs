@@ -156,10 +156,7 @@ impl RunCommand {
         let options = self.willmore().map(|options| &*options);
         let steps = match rule {
             StepRule::Controlled => {
-                scales.newton = NewtonParams {
-                    precision: scales.newton.precision,
-                    ..NewtonParams::second_order()
-                };
+                scales.newton = NewtonParams::second_order();
                 let mut control = ErrorControl::default();
                 match options.and_then(|options| options.tolerance) {
                     Some(Amount::Value(length)) => control.length = Some(length),
