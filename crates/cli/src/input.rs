@@ -195,6 +195,8 @@ pub struct Reader<'a> {
     /// Whether thin parts may be lost on the grid, if there is an option that says so.
     pub allows_loss: Option<bool>,
     options: &'a mut InputOptions,
+    /// The cells per unit length that were chosen, while others are tried.
+    chosen: Option<usize>,
     eps_over_h: f64,
     messages: MessageOptions,
 }
@@ -224,6 +226,7 @@ impl<'a> Reader<'a> {
         Ok(Self {
             source,
             allows_loss: None,
+            chosen: options.cells,
             options,
             eps_over_h,
             messages,
@@ -288,8 +291,8 @@ impl<'a> Reader<'a> {
         grids: &[usize],
         attempt: impl Fn(&mut Self) -> Result<(T, bool)>,
     ) -> Result<T> {
-        let chosen = self.options.cells.map(|cells| [cells]);
-        let grids = chosen.as_ref().map_or(grids, |chosen| &chosen[..]);
+        let chosen = self.chosen;
+        let grids = chosen.as_ref().map_or(grids, std::slice::from_ref);
         let (last, others) = grids.split_last().expect("there is a grid to try");
         for &cells in others {
             self.options.cells = Some(cells);
@@ -309,13 +312,12 @@ impl<'a> Reader<'a> {
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>> {
-        let is_chosen = self.options.cells.is_some();
         let (grid, thin) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(bounds, PART)?;
             let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
             Ok(((grid, thin), thin < THIN_PART))
         })?;
-        self.tell_thin(thin, &grid, WILL_NOT_LAST, !is_chosen)?;
+        self.tell_thin(thin, &grid, WILL_NOT_LAST, self.chosen.is_none())?;
         Ok(grid)
     }
 
@@ -396,18 +398,17 @@ impl<'a> Reader<'a> {
 
     /// The start of the flow of a mesh, on the coarsest grid that holds its thin parts, its components and its holes.
     fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded> {
-        let chosen = self.options.cells;
         let sides = mesh.mesh().sides(MOST_RAYS);
         let distance = MeshDistance::new(mesh);
         self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
-        let coarsest = std::mem::replace(&mut self.options.cells, chosen);
+        let coarsest = self.cells();
         let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
-        let grids: Vec<usize> = grids.filter(|&cells| Some(cells) >= coarsest).collect();
+        let grids: Vec<usize> = grids.filter(|&cells| cells >= coarsest).collect();
         let advice = format!(
             "give a larger --side-length or more --cells, or these --cells{} to go on without them",
             self.or_allow_loss()
         );
-        let refused = chosen.is_none() && self.allows_loss != Some(true);
+        let refused = self.chosen.is_none() && self.allows_loss != Some(true);
         let refused = refused.then_some(&*advice);
         let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
         let space = Space {
@@ -502,7 +503,6 @@ impl<'a> Reader<'a> {
     }
 
     fn built_in(&mut self, name: &str) -> Result<Loaded> {
-        let chosen = self.options.cells;
         let side = if self.source.is_planar()? {
             self.side::<2>(PART, ROOM)?
         } else {
@@ -514,7 +514,6 @@ impl<'a> Reader<'a> {
             BuiltIn::Mesh(mesh) => {
                 let grid = self.grid()?;
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side)?;
-                self.options.cells = chosen;
                 self.mesh(&mesh.placed(&placement), UpAxis::default())
             }
         }
