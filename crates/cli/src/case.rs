@@ -21,12 +21,6 @@ const INPAINT_STEP: f64 = 16.0;
 const INPAINT_HALVINGS: u32 = 12;
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;
-/// Most steps in which edges become round, of `eps^4` each.
-const ROUNDING: usize = 8;
-/// Edges are round where the [spread](ZeroSet::spread) is below this.
-const ROUND: f64 = 0.04;
-/// Round edges take at most this part of the area away.
-const LOST: f64 = 0.15;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<()> {
@@ -233,14 +227,11 @@ impl FlowOptions {
     }
 }
 
-/// Gives the start of a flow that holds the area round edges, if its edges are sharper than the interface is wide.
-///
-/// Such edges become round in the first step, which takes area away. To hold it there, the flow would have to make other edges. So they become
-/// round while the volume alone is held, if that is, and the area goes back to what it was, or to its target, over the steps of the ramp: the
-/// options say so then.
+/// Gives the start of a flow that holds the area [round edges](engine::round_edges), if its edges are sharper than the interface is wide. The
+/// area goes back to what it was, or to its target, over the steps of the ramp: the options say so then.
 ///
 /// # Errors
-/// With the volume held, where that does not help, or takes too much away, since the shape is too thin.
+/// With the volume held, where edges cannot be made round.
 pub fn round_edges<const D: usize>(
     options: &mut FlowOptions,
     start: &mut Stored<D>,
@@ -258,43 +249,27 @@ pub fn round_edges<const D: usize>(
         return Ok(());
     }
     let targets = options.held(start, eps, None)?.targets();
-    let steps = (StepRule::Constant(eps.powi(4)), ROUNDING);
-    let case = Case {
-        held: Held {
-            perimeter: None,
-            volume: holds_volume.then(|| Target::keep(sharp.volume)),
-        },
-        measures: Vec::new(),
-        ..Case::willmore("edges", start.clone(), operator, scales, steps)
-    };
-    let mut run = Run::new(case, device)?;
-    while run.step()?.is_some() {
-        let round = ZeroSet::of(&run.current(), eps)?;
-        if round.perimeter < (1.0 - LOST) * sharp.perimeter {
-            break;
+    let scheme = (scales, operator);
+    match engine::round_edges(start, &sharp, holds_volume, scheme, device)? {
+        Some((rounded, round)) => {
+            let of_surface = if D == 2 { "length" } else { "area" };
+            let area = targets.perimeter.unwrap_or(sharp.perimeter);
+            messages.note(&format!(
+                "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
+                round.perimeter, sharp.perimeter
+            ));
+            options.area = Some(SizeTarget::To(Amount::Value(area)));
+            if options.reduced_volume.take().is_some() {
+                let volume = targets.volume.unwrap_or(sharp.volume);
+                options.volume = Some(SizeTarget::To(Amount::Value(volume)));
+            }
+            *start = rounded;
         }
-        if round.spread > ROUND {
-            continue;
-        }
-        let of_surface = if D == 2 { "length" } else { "area" };
-        let area = targets.perimeter.unwrap_or(sharp.perimeter);
-        messages.note(&format!(
-            "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
-            round.perimeter, sharp.perimeter
-        ));
-        options.area = Some(SizeTarget::To(Amount::Value(area)));
-        if options.reduced_volume.take().is_some() {
-            let volume = targets.volume.unwrap_or(sharp.volume);
-            options.volume = Some(SizeTarget::To(Amount::Value(volume)));
-        }
-        start.clone_from(run.stored());
-        return Ok(());
-    }
-    if holds_volume {
-        refuse!(
+        None if holds_volume => refuse!(
             "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
              one of them",
-        );
+        ),
+        None => (),
     }
     Ok(())
 }
