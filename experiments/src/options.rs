@@ -6,8 +6,8 @@ use crate::prelude::libraries::*;
 /// Options of every program.
 #[derive(Args, Clone, Debug)]
 pub struct RunOptions {
-    /// Where tensors live: flex or ndarray (CPU, f64), wgpu or cuda (GPU, f32), if compiled in [default: the first
-    /// compiled in]
+    /// Where tensors live: flex or ndarray (CPU, f64), wgpu (GPU, f32) or cuda (GPU, f64), if compiled in
+    /// [default: the first compiled in]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
 

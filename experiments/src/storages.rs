@@ -156,7 +156,7 @@ impl Measured {
             stage.finish(&mut run)?;
             Ok(clock.elapsed().as_secs_f64())
         })?;
-        let mut numbers = timing::numbers(&run);
+        let mut numbers = timing::numbers(&run, &session.device);
         numbers.extend([
             ("seconds", seconds),
             ("active_cells", cells),
@@ -215,7 +215,7 @@ fn figure(measured: &[Measured], steps: usize, device: &ComputeDevice) -> Figure
     let memory = if device.kind().is_cpu() {
         "largest memory [MiB]"
     } else {
-        "largest memory of the host [MiB]"
+        "memory of the host [MiB]"
     };
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {

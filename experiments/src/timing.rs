@@ -56,11 +56,12 @@ pub fn mean<const D: usize>(run: &Run<D>, of: impl Fn(&StepRecord) -> f64) -> f6
     study::mean(minimizations(run.records()), of).unwrap_or(0.0)
 }
 
-/// Time and work of the steps; products on coarser grids count by their shares of the unknowns.
-pub fn numbers<const D: usize>(run: &Run<D>) -> Numbers {
+/// Time and work of the steps; products on coarser grids count by their shares of the unknowns. On a GPU, which computes while the host goes
+/// on, the time of a product is not known.
+pub fn numbers<const D: usize>(run: &Run<D>, device: &ComputeDevice) -> Numbers {
     let (seconds, products) = (seconds(run), mean(run, |r| r.newton.hvp as f64));
     let ms = 1e3 * mean(run, |r| r.times.products);
-    Numbers::from([
+    let mut numbers = Numbers::from([
         ("steps", seconds.len() as f64),
         ("seconds", seconds.iter().sum()),
         ("seconds_per_step", median(seconds)),
@@ -68,6 +69,9 @@ pub fn numbers<const D: usize>(run: &Run<D>) -> Numbers {
         ("hvp_per_step", mean(run, StepRecord::hvp)),
         ("hvp_on_this_grid", products),
         ("hvp_on_coarser_grids", mean(run, |r| r.start.hvp)),
-        ("ms_per_product", ms / products.max(1.0)),
-    ])
+    ]);
+    if device.kind().is_cpu() {
+        numbers.insert("ms_per_product", ms / products.max(1.0));
+    }
+    numbers
 }

@@ -43,8 +43,8 @@ struct Measurement {
     steps: Numbers,
     /// None on a GPU: those by hand are written for the CPU.
     products: Numbers,
-    /// Parts of the time of a step in seconds.
-    parts: [(&'static str, f64); 7],
+    /// Parts of the time of a step in seconds; what a GPU does counts where the host waits for it.
+    parts: Vec<(&'static str, f64)>,
 }
 
 const STEPS: [(&str, Format, &str); 11] = [
@@ -189,7 +189,7 @@ impl Measurement {
             let products = products.transpose()?.unwrap_or_default();
             Ok((products, distance.transpose()?))
         })?;
-        let mut steps = timing::numbers(&run);
+        let mut steps = timing::numbers(&run, &session.device);
         let floor = products.get("floor_single_ms").copied();
         let over_floor = floor.map(|ms| steps["ms_per_product"] / ms);
         let others = [
@@ -204,7 +204,7 @@ impl Measurement {
             case: case_name,
             n: n as usize,
             cells: vec![grid.cells(); D],
-            parts: parts(&run, floor.unwrap_or(0.0)),
+            parts: parts(&run, floor),
             steps,
             products,
         })
@@ -220,22 +220,28 @@ impl Measurement {
     }
 }
 
-/// Parts of the time of a step, where two pairs of transforms, timed alone, take so many milliseconds.
-fn parts<const D: usize>(run: &Run<D>, floor_ms: f64) -> [(&'static str, f64); 7] {
+/// Parts of the time of a step, where two pairs of transforms, if they were timed alone, take so many milliseconds.
+fn parts<const D: usize>(run: &Run<D>, floor_ms: Option<f64>) -> Vec<(&'static str, f64)> {
     let mean = |of: fn(&StepRecord) -> f64| timing::mean(run, of);
     let products = mean(|r| r.times.products);
-    let convolutions = (1e-3 * floor_ms * mean(|r| r.newton.hvp as f64)).min(products);
-    let mut parts = [
-        ("convolutions of products", convolutions),
-        ("other work of products", products - convolutions),
+    let mut parts = match floor_ms {
+        Some(ms) => {
+            let convolutions = (1e-3 * ms * mean(|r| r.newton.hvp as f64)).min(products);
+            vec![
+                ("convolutions of products", convolutions),
+                ("other work of products", products - convolutions),
+            ]
+        }
+        None => vec![("products", products)],
+    };
+    parts.extend([
         ("preconditioner", mean(|r| r.times.preconditioner)),
         ("coarse assembly", mean(|r| r.times.assembly)),
         ("energies and gradients", mean(|r| r.times.energies)),
         ("start on the half grid", mean(|r| r.times.start)),
-        ("rest", 0.0),
-    ];
+    ]);
     let all = parts.iter().map(|(_, seconds)| seconds).sum::<f64>();
-    parts[6].1 = (mean(|r| r.seconds) - all).max(0.0);
+    parts.push(("rest", (mean(|r| r.seconds) - all).max(0.0)));
     parts
 }
 
@@ -269,12 +275,17 @@ fn figure(all: &[Measurement], plane: &str, device: &ComputeDevice) -> Figure {
     }
     let parts = all[0].parts.iter().enumerate();
     let parts = parts.map(|(k, (part, _))| LegendEntry::line(*part, k, LineStyle::Solid));
+    let waiting = if device.kind().is_cpu() {
+        ""
+    } else {
+        " What the GPU does counts where the host waits for it."
+    };
     Figure::new("Willmore steps by the hybrid scheme", 2)
         .with_panel(cost.with_entries([]))
         .with_panel(shares.with_entries(parts).with_entries(entries))
         .with_shared_legend()
         .with_note(format!(
-            "2D: a {}, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: {}, eps = 2h, tau = 2⁻¹⁸. On {}. Cost of a step ~ unknowns to the power {}.",
+            "2D: a {}, eps = 2⁻⁶, tau = 2⁻¹⁴. 3D: {}, eps = 2h, tau = 2⁻¹⁸. On {}. Cost of a step ~ unknowns to the power {}.{waiting}",
             plane,
             solids.join(", "),
             timing::machine(device),

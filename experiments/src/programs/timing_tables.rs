@@ -141,7 +141,7 @@ pub fn program(options: &Options) -> Result<()> {
             let initial = initial.clone();
             let run = stage.run(Case::willmore(&mesh.title, initial, operator, scales, time))?;
             let papers_seconds = (mesh.is_papers && !quick).then_some(papers_seconds);
-            steps.push((method, timing::numbers(&run), papers_seconds));
+            steps.push((method, timing::numbers(&run, stage.device), papers_seconds));
         }
         Ok(steps)
     })?;
@@ -231,7 +231,7 @@ fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> R
     // The first row is that of the hybrid scheme.
     let hybrid = timing::seconds(&contenders[0].run);
     for timing in &mut contenders {
-        timing.numbers = timing.numbers(&hybrid);
+        timing.numbers = timing.numbers(&hybrid, &session.device);
     }
     Ok(contenders)
 }
@@ -253,8 +253,9 @@ fn seconds_left(seconds: &[f64], hybrid: &[f64]) -> f64 {
 
 impl Timing {
     /// Time and work, with the time of all steps in seconds: measured, and for the rest [extrapolated](seconds_left).
-    fn numbers(&self, hybrid: &[f64]) -> Numbers {
-        let (mut numbers, seconds) = (timing::numbers(&self.run), timing::seconds(&self.run));
+    fn numbers(&self, hybrid: &[f64], device: &ComputeDevice) -> Numbers {
+        let mut numbers = timing::numbers(&self.run, device);
+        let seconds = timing::seconds(&self.run);
         let (count, measured) = (seconds.len(), seconds.iter().sum::<f64>());
         let inner = self.run.statistics().unwrap_or_default();
         let per_step = |total: usize| total as f64 / count.max(1) as f64;
