@@ -1,5 +1,5 @@
 //! Circles under mean curvature flow and Willmore flow, compared with the exact solutions
-//! (eq:analyticSolutionMCFCircle and `R(t) = (r^4 + 2t)^(1/4)`).
+//! `R(t) = (r^2 - 2t)^(1/2)` and `R(t) = (r^4 + 2t)^(1/4)`.
 
 use geometry::exact::{mean_curvature_radius, willmore_radius};
 use runs::Interrupt;

@@ -94,11 +94,14 @@ impl<'a, const D: usize> Inpainted<'a, D> {
         for k in shown.chain([steps]) {
             distances.push((k, l2_distance(&trajectory.field(k)?, &goal)?));
         }
-        let (last, moves) = (trajectory.field(steps)?, case.region.iter().flatten());
+        let (last, moves) = (
+            trajectory.field(steps)?,
+            case.region.iter().flat_map(NodeSet::iter),
+        );
         let values = last.values().iter().zip(start.values());
         let changed_outside = values
             .zip(moves)
-            .filter(|((u, start), inside)| !**inside && u.to_bits() != start.to_bits())
+            .filter(|((u, start), inside)| !inside && u.to_bits() != start.to_bits())
             .count();
         Ok(Self {
             shape,

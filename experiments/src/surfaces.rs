@@ -282,7 +282,7 @@ impl Flowed {
         let u = Stored::from(self.trajectory.field(snapshot.step)?);
         let mut scene = Scene::new(&u, case.scales.eps)?;
         if let Some(region) = &case.region {
-            let mask = region.iter().map(|&moves| f64::from(moves)).collect();
+            let mask = region.iter().map(f64::from).collect();
             scene = scene.highlight_mask(&Field::from_values(*case.grid(), mask)?, MOVING)?;
         }
         Ok(scene.view(self.surface.view).tubes(snapshot.tubes.clone()))

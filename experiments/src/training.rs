@@ -55,7 +55,7 @@ impl NetworkSpec {
     }
 }
 
-/// Training needs double precision: the same options if their device has that, else with a CPU.
+/// Networks are trained on a CPU: the same options, with one if their device is none.
 pub fn in_double_precision(options: &RunOptions) -> Result<RunOptions> {
     let mut options = options.clone();
     if !options.open_device()?.kind().is_cpu() {

@@ -232,7 +232,7 @@ impl FlowOptions {
 ///
 /// # Errors
 /// With the volume held, where edges cannot be made round.
-pub fn round_edges<const D: usize>(
+pub fn with_round_edges<const D: usize>(
     options: &mut FlowOptions,
     start: &mut Stored<D>,
     device: &ComputeDevice,

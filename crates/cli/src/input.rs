@@ -21,7 +21,7 @@ pub struct Start<const D: usize, O> {
     pub initial: Stored<D>,
     pub presentation: O,
     /// The nodes that move, if not all.
-    pub region: Option<Vec<bool>>,
+    pub region: Option<NodeSet>,
 }
 
 /// What a run starts from, in the dimension of the input.
@@ -195,7 +195,7 @@ pub struct Reader<'a> {
     /// Whether thin parts may be lost on the grid, if there is an option that says so.
     pub allows_loss: Option<bool>,
     options: &'a mut InputOptions,
-    /// The cells per unit length that were chosen, while others are tried.
+    /// The cells per unit length that were chosen, if any; the options may hold others that are tried.
     chosen: Option<usize>,
     eps_over_h: f64,
     messages: MessageOptions,

@@ -68,33 +68,40 @@ impl Keep {
         }
     }
 
-    /// Whether each node of a grid moves: as the vertex that is nearest to it, where vertices are kept.
-    pub fn moving_nodes(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> Vec<bool> {
+    /// The nodes of a grid that move: as the vertex that is nearest to them, where vertices are kept.
+    pub fn moving_nodes(&self, grid: &Grid<3>, vertices: &[[f64; 3]]) -> NodeSet {
         if let Self::Inside(shape) = self {
-            let moves = |node| shape.signed_distance(grid.node(node)) > 0.0;
-            return (0..grid.len()).map(moves).collect();
+            return NodeSet::inside(grid, &|x| -shape.signed_distance(x));
         }
-        let mut nearest = vec![(f64::INFINITY, true); grid.len()];
-        let (spacing, last) = (grid.spacing(), grid.cells() as f64 - 1.0);
-        for &x in vertices {
-            let moves = !self.holds(x);
-            let at: [f64; 3] =
-                std::array::from_fn(|axis| (x[axis] - grid.origin()[axis]) / spacing);
-            let ends =
-                at.map(|at| [at - REACH, at + REACH].map(|end| end.clamp(0.0, last) as usize));
-            for i in ends[0][0]..=ends[0][1] {
-                for j in ends[1][0]..=ends[1][1] {
-                    for k in ends[2][0]..=ends[2][1] {
+        let (cells, origin, spacing) = (grid.cells(), grid.origin(), grid.spacing());
+        // By the planes of nodes that they reach: what is nearest is known of one plane at a time, for the sake of the memory.
+        let (mut reaching, mut planes) = (Vec::new(), vec![Vec::new(); cells]);
+        for (vertex, &x) in vertices.iter().enumerate() {
+            let at = [0, 1, 2].map(|axis| (x[axis] - origin[axis]) / spacing);
+            let end = |end: f64| end.clamp(0.0, cells as f64 - 1.0) as usize;
+            let ends = at.map(|at| end(at - REACH)..=end(at + REACH));
+            for plane in &mut planes[ends[0].clone()] {
+                plane.push(vertex);
+            }
+            reaching.push((at, ends, !self.holds(x)));
+        }
+        let moves = |(i, vertices): (usize, Vec<usize>)| {
+            let mut nearest = vec![(f64::INFINITY, true); cells * cells];
+            for vertex in vertices {
+                let (at, [_, rows, columns], moves) = &reaching[vertex];
+                for j in rows.clone() {
+                    for k in columns.clone() {
                         let off = [i, j, k].map(|n| n as f64);
                         let distance = (0..3).map(|axis| (off[axis] - at[axis]).powi(2)).sum();
-                        let node = &mut nearest[grid.index([i, j, k])];
+                        let node = &mut nearest[j * cells + k];
                         if distance < node.0 {
-                            *node = (distance, moves);
+                            *node = (distance, *moves);
                         }
                     }
                 }
             }
-        }
-        nearest.into_iter().map(|(_, moves)| moves).collect()
+            nearest.into_iter().map(|(_, moves)| moves)
+        };
+        planes.into_iter().enumerate().flat_map(moves).collect()
     }
 }

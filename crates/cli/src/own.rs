@@ -155,7 +155,7 @@ impl OwnMesh {
     }
 
     /// The nodes that may move, if not all.
-    pub fn nodes(&self, grid: &Grid<3>) -> Option<Vec<bool>> {
+    pub fn nodes(&self, grid: &Grid<3>) -> Option<NodeSet> {
         let keep = self.loaded().keep.as_ref()?;
         Some(keep.moving_nodes(grid, &self.rough().mesh().vertices))
     }
@@ -195,7 +195,7 @@ impl OwnMesh {
                 let (grid, moving) = (u.grid(), self.nodes(u.grid()));
                 let moves = |vertex: usize| {
                     let node = grid.nearest(mesh.vertices[vertex]);
-                    moving.as_ref().is_none_or(|moving| moving[node])
+                    moving.as_ref().is_none_or(|moving| moving.contains(node))
                 };
                 mesh = mesh.with_volume(rough.volume(), moves);
             }

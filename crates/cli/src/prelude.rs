@@ -6,7 +6,7 @@ pub use std::str::FromStr;
 pub use engine::{Case, Measure, Method, Record, Run, Scales, Scheme, StepRule, Stop};
 pub use geometry::measure::{BoundingBox, has_interface};
 pub use geometry::{
-    Field, Grid, PhaseField, Placement, SignedDistance, Stored, UpAxis, ZeroSet, npy,
+    Field, Grid, NodeSet, PhaseField, Placement, SignedDistance, Stored, UpAxis, ZeroSet, npy,
     optimal_profile, phase_field, stored_phase_field, vti,
 };
 pub use operators::{ComputeDevice, DeviceKind};

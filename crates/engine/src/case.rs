@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use fem::FiniteElementStep;
 use files::{Sha256, hexadecimal};
-use geometry::{Field, Grid, Stored};
+use geometry::{Field, Grid, NodeSet, Stored};
 use operators::ComputeDevice;
 use serde_json::{Value, json};
 use solver::FlowParams;
@@ -19,7 +19,7 @@ pub struct Case<const D: usize> {
     /// The initial phase field, without its pure phases.
     pub initial: Stored<D>,
     /// The nodes whose values may move, if not all.
-    pub region: Option<Vec<bool>>,
+    pub region: Option<NodeSet>,
     /// Spontaneous curvature, tension and pressure in the energy; mean curvature flow has none.
     pub energy: Helfrich,
     /// The sizes that are held; mean curvature flow holds none.
@@ -76,7 +76,7 @@ impl<const D: usize> Case<D> {
         Current {
             stored,
             initial: &self.initial,
-            region: self.region.as_deref(),
+            region: self.region.as_ref(),
             whole,
         }
     }
@@ -111,20 +111,28 @@ impl<const D: usize> Case<D> {
     /// What distinguishes this case from others, as stored in checkpoints; fields and networks are stored as checksums, and measures by their names.
     pub fn identity(&self, device: &ComputeDevice) -> Value {
         let grid = self.grid();
+        let rows = || (0..grid.len()).step_by(grid.cells());
         let (mut initial, mut row) = (Sha256::default(), vec![0.0; grid.cells()]);
-        for start in (0..grid.len()).step_by(grid.cells()) {
+        for start in rows() {
             self.initial.read(start, &mut row);
             let bytes = row.iter().flat_map(|value| value.to_le_bytes());
             initial.update(bytes.collect::<Vec<u8>>());
         }
-        let marks = |nodes: &Vec<bool>| -> Vec<u8> { nodes.iter().map(|&n| u8::from(n)).collect() };
+        let region = self.region.as_ref().map(|nodes| {
+            let (mut region, mut marks) = (Sha256::default(), nodes.iter().map(u8::from));
+            for _ in rows() {
+                let row = marks.by_ref().take(grid.cells());
+                region.update(row.collect::<Vec<u8>>());
+            }
+            hexadecimal(region.finish())
+        });
         let names: Vec<&str> = self.measures.iter().flat_map(Measure::names).collect();
         let mut identity = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             "grid": { "dimension": D, "cells": grid.cells(), "side": grid.side(), "origin": grid.origin().to_vec() },
             "initial": hexadecimal(initial.finish()),
-            "region": self.region.as_ref().map(marks).map(|marks| hexadecimal(Sha256::of(marks))),
+            "region": region,
             "flow": self.flow,
             "operator": self.operator.identity(),
             "scales": self.scales,

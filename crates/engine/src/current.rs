@@ -3,16 +3,16 @@
 use std::ops::Deref;
 use std::sync::OnceLock;
 
-use geometry::{Field, Nodes, PhaseField, Stored};
+use geometry::{Field, NodeSet, Nodes, PhaseField, Stored};
 
 /// The current phase field of a run, as it is stored ([`PhaseField`]), or, as a [`Field`], on the whole grid, which is made of it when it is
 /// first asked for. Outside of a region that has the initial values, also where the former has those of the pure phases since nothing is stored.
 pub struct Current<'a, const D: usize> {
     /// The initial one before the first step.
     pub(crate) stored: &'a Stored<D>,
-    /// What it keeps the values of outside of the region, if there is one.
+    /// Its values are kept outside of the region, if there is one.
     pub(crate) initial: &'a Stored<D>,
-    pub(crate) region: Option<&'a [bool]>,
+    pub(crate) region: Option<&'a NodeSet>,
     pub(crate) whole: &'a OnceLock<Field<D>>,
 }
 
@@ -30,13 +30,10 @@ impl<'a, const D: usize> Current<'a, D> {
     pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
         self.stored.read(start, part);
         if let Some(region) = self.region {
-            let mut initial = vec![0.0; part.len()];
-            self.initial.read(start, &mut initial);
-            let kept = initial.iter().zip(&region[start..]);
-            for (value, (initial, moves)) in part.iter_mut().zip(kept) {
-                if !moves {
-                    *value = *initial;
-                }
+            let moved = part.to_vec();
+            self.initial.read(start, part);
+            for range in region.within(start, moved.len()) {
+                part[range.clone()].copy_from_slice(&moved[range]);
             }
         }
     }
@@ -64,7 +61,7 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
     }
 
     fn at(&self, place: [usize; D]) -> f64 {
-        let keeps = |region: &[bool]| !region[self.stored.grid().index(place)];
+        let keeps = |region: &NodeSet| !region.contains(self.stored.grid().index(place));
         if self.region.is_some_and(keeps) {
             self.initial.at(place)
         } else {

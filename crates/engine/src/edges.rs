@@ -12,7 +12,7 @@ const ROUND: f64 = 0.04;
 /// Round edges take at most this part of the area away.
 const LOST: f64 = 0.15;
 
-/// A shape with its edges made round by Willmore flow, which may hold the volume, and what is measured on it; `sharp` is what was before.
+/// A shape with its edges made round by Willmore flow, which may hold the volume, and its zero set; `sharp` is that of `start`.
 ///
 /// Edges sharper than the interface become round in the first step of a flow, which takes area away. To hold it there, the flow would have to
 /// make other edges: one that holds the area begins with round ones. None where some steps do not make them round, or take too much away, since

@@ -31,7 +31,7 @@
 //! `[profile.dev]` and `[profile.dev.package."*"]` in its `Cargo.toml`. Without, each step takes many times as long.
 //!
 //! A [`Case`] is everything that a result depends on: initial phase field, region, sizes that are held, operator, scales, time steps, stop rules, measures.
-//! A [`Run`] computes a case, and [`Run::advance`] is the only loop over time steps. The solver knows nothing of files, progress or
+//! A [`Run`] computes a case, by steps ([`Run::step`]) or to its end ([`Run::advance`]), and nothing else does. The solver knows nothing of files, progress or
 //! shapes; [observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
 //! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
 //!

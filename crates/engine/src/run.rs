@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use fem::FiniteElementStep;
 use geometry::measure::{has_interface, l2_distance_of_parts};
-use geometry::{Field, PhaseField, Stored, require};
+use geometry::{Field, NodeSet, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
 use solver::{FlowState, StepRecord, widths_between};
@@ -62,7 +62,7 @@ impl<const D: usize> Run<D> {
             require("tau", first, expected, |tau| {
                 tau.to_bits() == mcf_step.to_bits()
             })?;
-            let nodes = case.region.as_ref().map_or(0, Vec::len) as f64;
+            let nodes = case.region.as_ref().map_or(0, NodeSet::len) as f64;
             require(
                 "nodes of a region",
                 nodes,
@@ -125,7 +125,7 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
-    /// A step that succeeds and is short enough, and what its record has to say of that alone.
+    /// A step that succeeds and is short enough. Its record lacks what the phase field says: measures, distances and whether a step is complete.
     fn attempt(&mut self) -> Result<Record, Error> {
         let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
         let halvings_of_motion = self.control.halvings_of_motion();
@@ -155,12 +155,12 @@ impl<const D: usize> Run<D> {
                 shorter.is_none()
             };
             // A shorter step changes what is held by less, too.
-            let gone = self.control.gone + size / self.control.step_size();
+            let gone = self.control.steps_gone + size / self.control.step_size();
             let constraints = self.case.held.at(gone);
             let refused = match self.motion.advance(size, order, constraints, accept) {
                 Ok((minimization, true)) => {
                     self.torn = true;
-                    // Of what it may.
+                    // How far it has gone over how far it may go.
                     let part = match &before {
                         Some((longest, _, before)) => self.has_gone(before)? / longest,
                         None => 0.0,
@@ -234,7 +234,7 @@ impl<const D: usize> Run<D> {
             step_size: self.control.last_size,
             is_willmore: case.energy.is_willmore(),
         };
-        let driven = !case.held.is_reached(self.control.gone);
+        let driven = !case.held.is_reached(self.control.steps_gone);
         let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
         stops.find(|stop| stop.holds(&progress)).copied()
     }
@@ -266,7 +266,8 @@ impl<const D: usize> Run<D> {
 
     /// The `L2` distance of two phase fields of this run.
     fn distance(&self, a: &Stored<D>, b: &Stored<D>) -> f64 {
-        let [a, b] = [a, b].map(|stored| self.case.current(stored, &self.whole));
+        let whole = OnceLock::new();
+        let [a, b] = [a, b].map(|stored| self.case.current(stored, &whole));
         l2_distance_of_parts(
             self.case.grid(),
             &|start, part| a.read(start, part),

@@ -30,9 +30,9 @@ pub(crate) struct StepControl {
     /// Steps completed, and the time reached.
     completed: usize,
     time: f64,
-    /// How many steps that is, parts of them included: so many the targets of what is held have gone.
-    pub(crate) gone: f64,
-    /// Size by the rule of the step to which the last record belongs.
+    /// Steps made, parts of them included, with which the targets of what is held move.
+    pub(crate) steps_gone: f64,
+    /// Size by the rule of the step to which the last record belongs; not a number before that.
     pub(crate) last_size: f64,
     /// Size of the present step by the rule, and as far as it does not go beyond the end.
     wanted: f64,
@@ -60,7 +60,7 @@ impl StepControl {
             least_energy: least_energy(case.grid()),
             completed: 0,
             time: 0.0,
-            gone: 0.0,
+            steps_gone: 0.0,
             last_size: f64::NAN,
             wanted: rule.size(1),
             size: f64::NAN,
@@ -129,7 +129,7 @@ impl StepControl {
     /// Moves on by a minimization; true if it completes the present step.
     pub(crate) fn accept(&mut self, record: &Record) -> Result<bool, Error> {
         self.last_size = self.step_size();
-        self.gone += record.tau / self.last_size;
+        self.steps_gone += record.tau / self.last_size;
         self.time = record.time;
         let mut substep = f64::INFINITY;
         if let Some(controller) = &mut self.controller {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::{Bricks, Field, Grid, Nodes, PhaseField, Stored};
+use geometry::{Bricks, Field, Grid, NodeSet, Nodes, PhaseField, Stored};
 use operators::ComputeDevice;
 use runs::{RunDirectory, State, StoredRun};
 use serde::de::DeserializeOwned;
@@ -165,12 +165,20 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
 
 /// The initial phase field of a stored run, and the nodes whose values move if not all do: a case can be built from them without its
 /// input.
-pub fn initial<const D: usize>(
-    stored: &StoredRun,
-) -> Result<(Stored<D>, Option<Vec<bool>>), Error> {
-    let region = stored.state().array("region");
-    let region = region.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect());
+pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Stored<D>, Option<NodeSet>), Error> {
     let grid = grid(stored)?;
+    let [ranges, marks] = ["region_ranges", "region"].map(|name| stored.state().array(name));
+    let region = match (ranges, marks) {
+        (Some(ends), _) => {
+            let ranges = ends
+                .chunks_exact(2)
+                .map(|ends| ends[0] as usize..ends[1] as usize);
+            let region = NodeSet::from_ranges(grid.len(), ranges);
+            Some(region.ok_or_else(|| unreadable(stored, "its region is none of its grid"))?)
+        }
+        // So earlier versions stored it.
+        (None, marks) => marks.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect()),
+    };
     let bricks = bricks(stored, "initial_bricks", &grid)?;
     let nodes = bricks.map_or_else(|| grid.into(), |bricks| Nodes::on_bricks(grid, bricks));
     let initial = Stored::from_values(nodes, values(stored, "initial")?);
@@ -220,8 +228,9 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
         packed = packed.with_array(&half_motion(level), motion.into_values());
     }
     if let Some(region) = &run.case.region {
-        let marks = region.iter().map(|&moves| f64::from(moves));
-        packed = packed.with_array("region", marks.collect::<Vec<f64>>());
+        let ranges = region.ranges().iter();
+        let ends = ranges.flat_map(|range| [range.start as f64, range.end as f64]);
+        packed = packed.with_array("region_ranges", ends.collect::<Vec<f64>>());
     }
     Ok(packed)
 }
@@ -245,6 +254,13 @@ fn restore<const D: usize>(
     let grid = *case.grid();
     let optional = |name: &str| state.array(name).map(<[f64]>::to_vec);
     let previous_tau: Option<f64> = read(stored, &state.notes["previous_tau"])?;
+    let previous = optional("previous");
+    if previous.is_some() != previous_tau.is_some() {
+        return Err(unreadable(
+            stored,
+            "the step before lacks its size or its phase field",
+        ));
+    }
     let (mut half_motions, mut half) = (Vec::new(), grid);
     while let Some(motion) = optional(&half_motion(half_motions.len())) {
         half = half.half()?;
@@ -253,7 +269,7 @@ fn restore<const D: usize>(
     let at = FlowState {
         bricks: bricks(stored, "bricks", &grid)?,
         current: values(stored, "current")?,
-        previous: optional("previous").zip(previous_tau),
+        previous: previous.zip(previous_tau),
         rate: optional("rate"),
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,

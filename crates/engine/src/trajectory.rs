@@ -172,7 +172,10 @@ fn found<const D: usize>(
         Err(error @ (RunsError::Locked(_) | RunsError::Io(_))) => return Err(error.into()),
         Err(_) => {}
     }
-    let removed = std::fs::remove_dir_all(folder).map_err(files::Error::of("remove", folder));
-    removed.map_err(RunsError::from)?;
-    Ok(None)
+    match std::fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(RunsError::from(files::Error::of("remove", folder)(error)).into())
+        }
+        _ => Ok(None),
+    }
 }

@@ -35,7 +35,7 @@ pub struct Statistics {
     pub factorizations: usize,
 }
 
-/// Multilinear finite elements for the step (eq:implicitMCF) and its semi-implicit relative, on `cells^D` nodes.
+/// Multilinear finite elements for the implicit step of the paper and its semi-implicit relative, on `cells^D` nodes.
 ///
 /// With the mass matrix `M` and the stiffness matrix `S` of the periodic grid, `kappa = tautilde/(2 eps^2)` and
 /// `Psi'(v) = 9/4 (v^3 - v)`:

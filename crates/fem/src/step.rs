@@ -53,7 +53,7 @@ pub struct FiniteElementStep<const D: usize> {
 }
 
 impl<const D: usize> FiniteElementStep<D> {
-    /// The implicit step (eq:implicitMCF): the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`, by Newton's method.
+    /// The implicit step of the paper: the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`, by Newton's method.
     ///
     /// # Errors
     /// As [`Scheme::new`].

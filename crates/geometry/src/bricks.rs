@@ -321,13 +321,17 @@ impl<const D: usize> Bricks<D> {
         table
     }
 
+    /// Where on the grid the rows of the active bricks begin, of `B` cells each.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = usize> {
+        let cells = (0..self.len()).step_by(self.side());
+        cells.map(|cell| flat(self.multi_index(cell), self.cells()))
+    }
+
     /// The values of the active bricks, of those of the whole grid.
-    pub fn gather<T: Copy>(&self, dense: &[T]) -> Vec<T> {
+    pub fn gather(&self, dense: &[f64]) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.len());
-        // Row by row of the active bricks.
-        for cell in (0..self.len()).step_by(self.side()) {
-            let start = flat(self.multi_index(cell), self.cells());
-            values.extend_from_slice(&dense[start..][..self.side()]);
+        for first in self.rows() {
+            values.extend_from_slice(&dense[first..][..self.side()]);
         }
         values
     }

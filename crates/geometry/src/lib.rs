@@ -52,6 +52,7 @@ mod bricks;
 mod error;
 mod field;
 mod grid;
+mod node_set;
 mod nodes;
 mod placement;
 mod profile;
@@ -79,6 +80,7 @@ pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
+pub use node_set::NodeSet;
 pub use nodes::{Nodes, PhaseField, check_values};
 pub use placement::Placement;
 pub use profile::{

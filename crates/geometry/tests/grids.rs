@@ -2,7 +2,8 @@
 
 #![allow(clippy::float_cmp, reason = "where equality is asserted, it is exact")]
 
-use geometry::{Error, Field, Grid};
+use geometry::shapes::{Ball, Cuboid};
+use geometry::{Bricks, Error, Field, Grid, NodeSet, SignedDistance, SignedDistanceExt};
 use proptest::prelude::*;
 
 #[test]
@@ -107,5 +108,54 @@ proptest! {
         prop_assert!((field.interpolate(image) - bilinear(x)).abs() < 1e-13);
         let seam = field.interpolate([0.875, 0.0]);
         prop_assert!((seam - 0.5 * (1.75 + 1.0)).abs() < 1e-14);
+    }
+
+    /// Runs of equal marks, as in rows of a region.
+    #[test]
+    fn sets_of_nodes_are_their_marks(runs in prop::collection::vec((any::<bool>(), 1_usize..40), 1..30)) {
+        let mut marks: Vec<bool> = Vec::new();
+        for (mark, len) in &runs {
+            marks.extend(vec![*mark; *len]);
+        }
+        marks.resize(1024, false);
+        let set: NodeSet = marks.iter().copied().collect();
+        prop_assert_eq!(set.iter().collect::<Vec<_>>(), &*marks);
+        prop_assert!((0..marks.len()).all(|node| set.contains(node) == marks[node]));
+        prop_assert_eq!((set.grid_len(), set.len()), (1024, marks.iter().filter(|mark| **mark).count()));
+        prop_assert_eq!(set.is_empty(), !marks.contains(&true));
+        for (first, len) in [(0, 1024), (17, 100), (1000, 24), (512, 1)] {
+            let mut part = vec![false; len];
+            set.within(first, len).for_each(|range| part[range].fill(true));
+            prop_assert_eq!(&part, &marks[first..first + len]);
+        }
+        let again = NodeSet::from_ranges(1024, set.ranges().iter().cloned());
+        prop_assert_eq!(again.as_ref(), Some(&set));
+        let bricks = Bricks::<2>::new(32, 8, |[row, column]| row != column, |_| false).unwrap();
+        let values: Vec<f64> = marks.iter().map(|mark| f64::from(*mark)).collect();
+        let stored = set.on(&bricks).into_iter().map(f64::from);
+        prop_assert_eq!(stored.collect::<Vec<_>>(), bricks.gather(&values));
+    }
+
+    #[test]
+    fn the_nodes_inside_a_shape_are_those_of_negative_distance(
+        centre in prop::array::uniform3(-0.6..0.6_f64), size in 0.01..0.5_f64,
+    ) {
+        let grid = Grid::<3>::centred(20, 1.0).unwrap();
+        let ball = Ball::new(centre, size).unwrap();
+        let cube = Cuboid::new([size, 0.3, 0.1]).unwrap();
+        let shape = ball.difference(cube);
+        for sign in [1.0, -1.0] {
+            let distance = |x| sign * shape.signed_distance(x);
+            let expected: NodeSet = (0..grid.len()).map(|node| distance(grid.node(node)) < 0.0).collect();
+            prop_assert_eq!(NodeSet::inside(&grid, &distance), expected);
+        }
+    }
+}
+
+#[test]
+fn ranges_that_are_no_set_of_nodes_are_refused() {
+    assert!(NodeSet::from_ranges(9, [0..2, 3..9]).is_some());
+    for ranges in [[0..2, 2..9], [3..9, 0..2], [0..2, 3..10], [0..0, 3..9]] {
+        assert_eq!(NodeSet::from_ranges(9, ranges.clone()), None, "{ranges:?}");
     }
 }

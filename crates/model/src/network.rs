@@ -44,16 +44,16 @@ pub struct Provenance {
     pub seed: u64,
     /// Version of the program that trained it.
     pub version: String,
-    /// What the training reported last: the loss (eq:mcf_scheme_optimization_discrete) on its samples, and for the accurate recipe, whose
+    /// What the training reported last: the loss of the paper on its samples, and for the accurate recipe, whose
     /// last part imitates its function by a perceptron, the residual of that.
     pub training_loss: f64,
-    /// Loss (eq:mcf_scheme_optimization_discrete) on held-out radii, whole grid.
+    /// Loss of the paper on held-out radii, whole grid.
     pub held_out_loss: f64,
     /// Held-out loss with both phases exchanged.
     pub flipped_loss: f64,
 }
 
-/// The learned mean-curvature operator `V[u] = F(K * u)` (eq:mcf_operator_discrete).
+/// The learned mean-curvature operator `V[u] = F(K * u)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
     ratios: Ratios,

@@ -27,7 +27,7 @@ pub const REFERENCE_RADII: [f64; 40] = [
 /// Measured properties of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Loss (eq:mcf_scheme_optimization_discrete) on held-out radii spread evenly over the range, whole grids.
+    /// Loss of the paper on held-out radii spread evenly over the range, whole grids.
     pub held_out_loss: f64,
     /// The same with both phases exchanged.
     pub flipped_loss: f64,

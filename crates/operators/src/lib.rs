@@ -29,7 +29,7 @@
 //! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
 //! centre in the middle; leading axes beyond the kernel's are a batch. The CPU backends (`flex`, `ndarray`) compute in
 //! the tensor's own precision, `f64` unless asked otherwise, by real FFTs of any length (realfft, rustfft). On a GPU the
-//! operations are CubeCL kernels or composed of Burn's, in `f32` unless asked otherwise. The same input gives the same bytes on a CPU, whatever
+//! operations are CubeCL kernels or composed of Burn's, in `f32` on `wgpu` and usually in `f64` on `cuda`. The same input gives the same bytes on a CPU, whatever
 //! the number of threads.
 
 // Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.

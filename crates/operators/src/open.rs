@@ -8,7 +8,7 @@ use crate::{ComputeDevice, DeviceKind, Error};
 
 impl ComputeDevice {
     /// Opens a device. A GPU is compared with the CPU first, on operations that drivers and tuned kernels have been
-    /// seen to get wrong: `cuda` in double precision, too, in which it then computes.
+    /// seen to get wrong. `cuda` computes in double precision if it agrees in that, too, or else in single precision.
     ///
     /// # Errors
     /// [`Error::NotCompiled`], [`Error::Unavailable`] without a usable adapter, [`Error::WrongArithmetic`].
@@ -25,8 +25,10 @@ impl ComputeDevice {
             #[cfg(feature = "cuda")]
             DeviceKind::Cuda => {
                 let single = device_check::open_gpu(kind, || Device::cuda(0))?;
-                let double = single.clone().with_dtype(DType::F64);
-                Ok(double.unwrap_or(single))
+                match single.clone().with_dtype(DType::F64) {
+                    Err(Error::WrongArithmetic { .. }) => Ok(single),
+                    double => double,
+                }
             }
             #[allow(unreachable_patterns)] // reachable unless every backend is compiled in
             _ => Err(kind.not_compiled()),

@@ -329,7 +329,7 @@ impl<'a, const D: usize> Held<'a, D> {
     /// Zero where nothing may move.
     fn inside(&self, mut values: Vec<f64>) -> Vec<f64> {
         if let Some(region) = self.region {
-            for (value, inside) in values.iter_mut().zip(&*region.nodes) {
+            for (value, inside) in values.iter_mut().zip(&*region.marks) {
                 if !inside {
                     *value = 0.0;
                 }

@@ -110,7 +110,7 @@ pub trait Objective<const D: usize> {
     fn unit(&self) -> f64;
 }
 
-/// The energy of one minimizing movement (eq:fully_discrete_willmore_flow_energy), scaled by `N / (2 eps)`:
+/// The energy of one minimizing movement, scaled by `N / (2 eps)`:
 ///
 /// `E(u) = 1/2 |u - a|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
 /// the [stiffness](crate::FlowParams::stiffness) `c`,

@@ -50,7 +50,7 @@ pub enum Error {
     #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
     VolumeTooLarge { volume: f64, box_volume: f64 },
     #[error(
-        "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; mark at least one node, and give a mark for each"
+        "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; it needs nodes of that grid, one at least"
     )]
     Region {
         marks: usize,

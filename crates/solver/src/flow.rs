@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Field, Grid, PhaseField, Stored};
+use geometry::{Bricks, Field, Grid, NodeSet, PhaseField, Stored};
 use model::{MeanCurvatureOperator, Network, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,7 @@ pub struct StepRecord {
     pub time: f64,
     /// Its size `tau`.
     pub tau: f64,
-    /// `E[u_k, u_k]`: the energy (eq:discrete_willmore_flow_energy) of standing still, true L2 norms; its terms are divided by
+    /// `E[u_k, u_k]`: the energy of standing still, true L2 norms; its terms are divided by
     /// the factors of the calibration.
     pub energy_before: f64,
     /// `E[u_k, u_{k+1}]`.
@@ -228,16 +228,14 @@ impl<const D: usize> WillmoreFlow<D> {
         })
     }
 
-    /// Lets only the values at these nodes move from now on, in the order of the grid; the others stay, bit for bit where they are stored.
+    /// Lets only the values at these nodes move from now on; the others stay, bit for bit where they are stored.
     /// The energy is that of the whole field.
     ///
     /// # Errors
-    /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
-    pub fn restrict_to(&mut self, nodes: &[bool]) -> Result<(), Error> {
-        let mut region = Region::new(&self.grid, nodes, &self.device)?;
-        if let Some(active) = &self.active {
-            region = region.on(&active.bricks, &self.device);
-        }
+    /// [`Error::Region`] for nodes of another grid, or none.
+    pub fn restrict_to(&mut self, nodes: &NodeSet) -> Result<(), Error> {
+        let bricks = self.active.as_ref().map(|active| &*active.bricks);
+        let region = Region::new(&self.grid, Arc::new(nodes.clone()), bricks, &self.device)?;
         self.restrict_half(nodes)?;
         self.region = Some(region);
         Ok(())
@@ -410,7 +408,7 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(motion < FAR * FAR * profile)
     }
 
-    /// One step of size `tau` (eq:discrete_willmore_step).
+    /// One step of size `tau`.
     ///
     /// # Errors
     /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`]; the flow stays where it was.
@@ -591,7 +589,7 @@ struct Minimum<const D: usize> {
     times: PhaseTimes,
 }
 
-/// Mean curvature flow by repeated application of a step: the learned operator (eq:mcf_operator_discrete) or another.
+/// Mean curvature flow by repeated application of a step: the learned operator or another.
 pub struct MeanCurvatureFlow<const D: usize> {
     grid: Grid<D>,
     mcf: Arc<dyn MeanCurvatureStep<D>>,

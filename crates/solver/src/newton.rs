@@ -1,7 +1,7 @@
 //! Newton's method for one minimizing movement.
 //!
 //! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
-//! plain Newton-CG with Armijo's rule of the paper (alg:hybrid_scheme), kept for comparison.
+//! plain Newton-CG with Armijo's rule of the paper, kept for comparison.
 
 use std::cell::Cell;
 
@@ -25,7 +25,7 @@ pub enum Exit {
     Converged,
     /// The gradient vanishes to rounding: `u` is a minimizer already.
     Stationary,
-    /// No step along a descent direction lowers the energy by more than rounding.
+    /// No step along a descent direction lowers the energy by more than rounding, or none is expected to.
     Precision,
     /// The limit of Newton steps was reached.
     IterationLimit,
@@ -401,8 +401,9 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let solution = self.solve(&point, limits, Level::Both)?;
             let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
-            // What is less than rounding no search finds.
-            let lost = (decrease <= self.noise(point.energy)).then_some(Exit::Precision);
+            // No search finds a decrease below the rounding of the energy.
+            let lost = !solution.negative_curvature && decrease <= self.noise(point.energy);
+            let lost = lost.then_some(Exit::Precision);
             let done = self.converged(motion, solution.slope).or(lost);
             self.info.newton += 1;
             if let Some(exit) = done {
@@ -410,7 +411,9 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 let mut end = (point.u, point.energy);
                 if let Some(place) = self.place(self.hold(u))? {
                     let energy = self.energy(&place)?;
-                    if energy <= end.1 {
+                    // What rounding alone says against the step does not count.
+                    let rounding = lost.map_or(0.0, |_| self.noise(end.1));
+                    if energy <= end.1 + rounding {
                         end = (place.u, energy);
                     }
                 }
@@ -455,7 +458,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
     }
 
-    /// alg:hybrid_scheme: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
+    /// The method of the paper: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
     fn paper(&mut self) -> Result<End<D>, Error> {
         let mut point = self.point(self.found(self.previous, false)?)?;
         let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();

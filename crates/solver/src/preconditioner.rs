@@ -38,7 +38,7 @@ impl<const D: usize> Preconditioner<D> {
     /// Moves the coarse correction to the interface of `u`.
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         let u = device.values(u.clone())?;
-        let region = self.region.as_ref().map(|region| &*region.nodes);
+        let region = self.region.as_ref().map(|region| &*region.marks);
         let modes = InterfaceModes::new(&self.nodes, &u, self.eps, self.step, region);
         self.interface = modes.map(SharedUpdate::new);
         Ok(())

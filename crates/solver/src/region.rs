@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::{Bool, Tensor};
-use geometry::{Bricks, Grid};
+use geometry::{Bricks, Grid, NodeSet};
 use operators::ComputeDevice;
 
 use crate::Error;
@@ -11,50 +11,63 @@ use crate::Error;
 /// The grid nodes whose values may change; the others keep theirs, bit for bit.
 #[derive(Clone)]
 pub(crate) struct Region<const D: usize> {
-    /// Which nodes of the grid are inside, in its order,
+    /// The nodes of the grid inside.
+    pub(crate) nodes: Arc<NodeSet>,
+    /// Whether each of those that are stored is inside.
     pub(crate) marks: Arc<[bool]>,
-    /// and which of those that are stored.
-    pub(crate) nodes: Arc<[bool]>,
     /// The indicator function of the region: 1 inside, 0 outside.
     inside: Tensor<D>,
     outside: Tensor<D, Bool>,
 }
 
 impl<const D: usize> Region<D> {
-    /// The nodes that are marked, in the order of the grid.
+    /// These nodes, for fields on the whole grid or on these bricks.
     ///
     /// # Errors
-    /// [`Error::Region`] if there are not as many marks as nodes, or if none is set.
-    pub fn new(grid: &Grid<D>, nodes: &[bool], device: &ComputeDevice) -> Result<Self, Error> {
-        let marked = nodes.iter().filter(|inside| **inside).count();
-        if nodes.len() != grid.len() || marked == 0 {
+    /// [`Error::Region`] for nodes of another grid, or none.
+    pub fn new(
+        grid: &Grid<D>,
+        nodes: Arc<NodeSet>,
+        bricks: Option<&Bricks<D>>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        if nodes.grid_len() != grid.len() || nodes.is_empty() {
             return Err(Error::Region {
-                marks: nodes.len(),
+                marks: nodes.grid_len(),
                 nodes: grid.len(),
-                marked,
+                marked: nodes.len(),
             });
         }
-        let marks: Arc<[bool]> = nodes.into();
-        Ok(Self::stored(marks.clone(), marks, grid.shape(), device))
+        Ok(match bricks {
+            Some(bricks) => Self::stored(nodes, bricks, device),
+            None => {
+                let marks = nodes.iter().collect();
+                Self::marked(nodes, marks, grid.shape(), device)
+            }
+        })
     }
 
     /// The same region for fields on these bricks.
     pub(crate) fn on(&self, bricks: &Bricks<D>, device: &ComputeDevice) -> Self {
-        let nodes = bricks.gather(&self.marks).into();
-        Self::stored(self.marks.clone(), nodes, bricks.shape(), device)
+        Self::stored(self.nodes.clone(), bricks, device)
     }
 
-    fn stored(
+    fn stored(nodes: Arc<NodeSet>, bricks: &Bricks<D>, device: &ComputeDevice) -> Self {
+        let marks = nodes.on(bricks).into();
+        Self::marked(nodes, marks, bricks.shape(), device)
+    }
+
+    fn marked(
+        nodes: Arc<NodeSet>,
         marks: Arc<[bool]>,
-        nodes: Arc<[bool]>,
         shape: [usize; D],
         device: &ComputeDevice,
     ) -> Self {
-        let values: Vec<f64> = nodes.iter().map(|&inside| f64::from(inside)).collect();
+        let values: Vec<f64> = marks.iter().map(|&inside| f64::from(inside)).collect();
         let inside = device.tensor::<D>(&values, shape);
         Self {
-            marks,
             nodes,
+            marks,
             outside: inside.clone().equal_elem(0.0),
             inside,
         }

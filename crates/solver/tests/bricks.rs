@@ -6,7 +6,7 @@ use crate::common::{accurate, device, distance, dot, network, noise, params, pas
 use geometry::distance::SignedDistanceExt;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Cross};
-use geometry::{Bricks, Field, Grid, SignedDistance, phase_field};
+use geometry::{Bricks, Field, Grid, NodeSet, SignedDistance, phase_field};
 use linearize::taylor::halvings;
 use model::{Network, SeparableOperator};
 use solver::{
@@ -264,7 +264,7 @@ fn a_region_moves_on_bricks_as_on_the_grid() {
     let mut flow = bricks(&cross(), exact(&grid));
     flow.advance(exact(&grid).mcf_step).unwrap();
     let start = flow.field().unwrap();
-    let inside: Vec<bool> = (0..grid.len()).map(|i| grid.node(i)[0] > 0.1).collect();
+    let inside: NodeSet = (0..grid.len()).map(|i| grid.node(i)[0] > 0.1).collect();
     let params = exact(&grid);
     let ends = [dense, bricks].map(|flow| {
         let mut flow = flow(&start, params);
@@ -274,7 +274,7 @@ fn a_region_moves_on_bricks_as_on_the_grid() {
         }
         let end = flow.field().unwrap();
         assert!(l2_distance(&end, &start).unwrap() > 1e-3);
-        for (node, _) in inside.iter().enumerate().filter(|(_, moves)| !**moves) {
+        for (node, _) in inside.iter().enumerate().filter(|(_, moves)| !moves) {
             // Up to the values that are not stored.
             let change = end.values()[node] - start.values()[node];
             assert!(change.abs() < 2e-5, "node {node}: {change:e}");

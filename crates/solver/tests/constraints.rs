@@ -3,7 +3,7 @@
 use crate::common::{accurate, ball, device, network, params};
 use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::zero_set::reduced_volume;
-use geometry::{Field, Grid, SignedDistance, ZeroSet, phase_field};
+use geometry::{Field, Grid, NodeSet, SignedDistance, ZeroSet, phase_field};
 use model::Shipped;
 use solver::{Constraints, Error, Exit, StepRecord, WillmoreFlow};
 
@@ -227,15 +227,15 @@ fn constraints_hold_in_regions_and_in_second_order_steps() {
     let u = ellipse(0.3, 0.2);
     let tau = 0.25 * plane().spacing().powi(2);
     let mut flow = keeping(&u, BOTH);
-    let right: Vec<bool> = (0..u.grid().len())
+    let right: NodeSet = (0..u.grid().len())
         .map(|i| u.grid().node(i)[0] > -0.1)
         .collect();
     flow.restrict_to(&right).unwrap();
     let (_, drift) = run(&mut flow, BOTH, tau, 3);
     assert!(drift < 1e-11, "{drift:e}");
     let end = flow.field().unwrap();
-    let pairs = end.values().iter().zip(u.values()).zip(&right);
-    for ((now, before), _) in pairs.filter(|(_, inside)| !**inside) {
+    let pairs = end.values().iter().zip(u.values()).zip(right.iter());
+    for ((now, before), _) in pairs.filter(|(_, inside)| !inside) {
         assert_eq!(now.to_bits(), before.to_bits());
     }
 

@@ -2,12 +2,12 @@
 
 use crate::common::{ball, device, network, network_3d, params};
 use geometry::shapes::Ball;
-use geometry::{Field, Grid, SignedDistanceExt, measure, phase_field};
+use geometry::{Field, Grid, NodeSet, SignedDistanceExt, measure, phase_field};
 use model::Network;
 use solver::{Error, Exit, WillmoreFlow};
 
 /// A ball without the part beyond a plane through its middle, and a cube around the cut.
-fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, Vec<bool>) {
+fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, NodeSet) {
     let ball = Ball::new([0.0; D], 0.25).unwrap();
     let shape = ball.difference(|x: [f64; D]| 0.12 - x[0]);
     let nodes = (0..grid.len()).map(|i| grid.node(i)[0] > 0.05).collect();
@@ -31,9 +31,14 @@ fn only_the_region_moves<const D: usize>(grid: Grid<D>, network: &Network, tau: 
     }
     let field = flow.field().unwrap();
     let mut moved = 0;
-    for ((u, start), inside) in field.values().iter().zip(initial.values()).zip(&nodes) {
+    for ((u, start), inside) in field
+        .values()
+        .iter()
+        .zip(initial.values())
+        .zip(nodes.iter())
+    {
         let same = u.to_bits() == start.to_bits();
-        assert!(same || *inside);
+        assert!(same || inside);
         moved += usize::from(!same);
     }
     assert!(moved > 0);
@@ -60,7 +65,8 @@ fn everything_as_region_is_no_region() {
     let tau = grid.spacing().powi(2);
     let mut free = flow(grid, &network(), &initial);
     let mut restricted = flow(grid, &network(), &initial);
-    restricted.restrict_to(&vec![true; grid.len()]).unwrap();
+    let all = (0..grid.len()).map(|_| true).collect();
+    restricted.restrict_to(&all).unwrap();
     for _ in 0..2 {
         free.advance(tau).unwrap();
         restricted.advance(tau).unwrap();
@@ -93,8 +99,8 @@ fn the_minimizer_is_stationary_inside() {
         let (_, gradient) = energy.evaluate(&tensor(u)).unwrap();
         let gradient = device().values(gradient).unwrap();
         let mut squares = [0.0; 2];
-        for (g, inside) in gradient.iter().zip(&nodes) {
-            squares[usize::from(*inside)] += g * g;
+        for (g, inside) in gradient.iter().zip(nodes.iter()) {
+            squares[usize::from(inside)] += g * g;
         }
         squares.map(f64::sqrt)
     };
@@ -110,7 +116,8 @@ fn regions_that_do_not_fit_are_refused() {
     let initial = ball(grid, 0.25);
     let mut flow = flow(grid, &network(), &initial);
     for nodes in [vec![true; 7], vec![false; grid.len()]] {
-        let error = flow.restrict_to(&nodes).unwrap_err();
+        let error = flow.restrict_to(&nodes.into_iter().collect());
+        let error = error.unwrap_err();
         assert!(matches!(error, Error::Region { .. }), "{error}");
     }
 }

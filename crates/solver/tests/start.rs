@@ -3,7 +3,7 @@
 use crate::common::{device, network, params};
 use geometry::measure::l2_distance;
 use geometry::shapes::Cross;
-use geometry::{Field, Grid, phase_field};
+use geometry::{Field, Grid, NodeSet, phase_field};
 use model::{Network, Ratios, Shipped};
 use solver::{Error, FlowParams, StartKind, StepRecord, WillmoreFlow};
 
@@ -146,10 +146,10 @@ fn a_grid_that_gives_up_in_the_middle_of_a_chain() {
 
 #[test]
 fn a_region_is_held_on_both_grids() {
-    let inside: Vec<bool> = (0..grid().len())
+    let inside: NodeSet = (0..grid().len())
         .map(|node| grid().node(node).iter().all(|x| x.abs() < 0.16))
         .collect();
-    let restricted = |region: &[bool], region_first: bool| {
+    let restricted = |region: &NodeSet, region_first: bool| {
         let mut flow = flow(!region_first);
         flow.restrict_to(region).unwrap();
         if region_first {
@@ -163,8 +163,8 @@ fn a_region_is_held_on_both_grids() {
         assert_eq!(record.start.kind, StartKind::HalfGrid);
         let (u, start) = (flow.field().unwrap(), cross());
         let mut moved = 0.0_f64;
-        for ((u, start), inside) in u.values().iter().zip(start.values()).zip(&inside) {
-            if *inside {
+        for ((u, start), inside) in u.values().iter().zip(start.values()).zip(inside.iter()) {
+            if inside {
                 moved = moved.max((u - start).abs());
             } else {
                 assert_eq!(u.to_bits(), start.to_bits());
@@ -173,7 +173,7 @@ fn a_region_is_held_on_both_grids() {
         assert!(moved > 0.1, "{moved}");
     }
     // A region between the nodes of the half grid.
-    let column: Vec<bool> = (0..grid().len())
+    let column: NodeSet = (0..grid().len())
         .map(|node| grid().multi_index(node)[1] == 129)
         .collect();
     for region_first in [true, false] {

@@ -15,8 +15,8 @@ pub use engine::{
 pub use geometry::measure::{BoundingBox, l2_distance, zero_set_volume};
 pub use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Ellipse};
 pub use geometry::{
-    Field, Grid, PhaseField, Placement, SignedDistance, SignedDistanceExt, Stored, UpAxis, ZeroSet,
-    optimal_profile, phase_field,
+    Field, Grid, NodeSet, PhaseField, Placement, SignedDistance, SignedDistanceExt, Stored, UpAxis,
+    ZeroSet, optimal_profile, phase_field,
 };
 pub use indicatif::ProgressBar;
 pub use operators::{ComputeDevice, DeviceKind, memory};

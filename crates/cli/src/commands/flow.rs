@@ -2,7 +2,7 @@
 
 use engine::Store;
 
-use crate::case::round_edges;
+use crate::case::with_round_edges;
 use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
 use crate::input::{Loaded, Reader, Start};
@@ -143,20 +143,20 @@ impl Job {
         start.presentation.turn(&mut options.up)?;
         options.save.as_deref().map_or(Ok(()), O::check_saved)?;
         if let RunCommand::Flow(options) = &mut self.command {
-            round_edges(options, &mut start.initial, &self.device, self.messages)?;
+            with_round_edges(options, &mut start.initial, &self.device, self.messages)?;
         }
         let (case, presentation) = self.command.case(start)?;
         // The options of which the same run can be made again.
-        let mut stored = self.command.clone();
+        let mut noted = self.command.clone();
         // Standard output is not there any more when a run is resumed.
         if self.messages.to_pipe {
-            stored.options().save = None;
+            noted.options().save = None;
         }
         // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
-        if matches!(&stored, RunCommand::Fair(fair) if !fair.ends) {
-            stored.options().steps = None;
+        if matches!(&noted, RunCommand::Fair(fair) if !fair.ends) {
+            noted.options().steps = None;
         }
-        let options = config::resolved(stored.name(), &stored)?;
+        let options = config::resolved(noted.name(), &noted)?;
         let plan = self.plan(presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;

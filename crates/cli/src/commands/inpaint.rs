@@ -42,8 +42,8 @@ impl InpaintOptions {
         let mut field = start.initial.field()?;
         let grid = *field.grid();
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
-        let region: Vec<bool> = (0..grid.len()).map(inside).collect();
-        if !region.contains(&true) {
+        let region: NodeSet = (0..grid.len()).map(inside).collect();
+        if region.is_empty() {
             refuse!(
                 "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
                 self.mask.as_deref().unwrap_or_default(),
@@ -59,7 +59,7 @@ impl InpaintOptions {
             Ansatz::Shape(shape) => phase_field(grid, shape.shape::<D>()?.as_ref(), eps)?,
         };
         let values = field.values_mut().iter_mut().zip(inner.values());
-        for ((value, inner), _) in values.zip(&region).filter(|(_, inside)| **inside) {
+        for ((value, inner), _) in values.zip(region.iter()).filter(|(_, inside)| *inside) {
             *value = *inner;
         }
         (start.initial, start.region) = (field.into(), Some(region));

@@ -1,4 +1,4 @@
-//! The paper's training (alg:mcf_training): Adam on mini-batches of whole grids, refined progressively.
+//! The paper's training: Adam on mini-batches of whole grids, refined progressively.
 
 use burn::optim::{Adam, AdamConfig, AdamState as BurnState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::Tensor;
@@ -56,7 +56,7 @@ pub struct AdamState {
     pub epoch: usize,
 }
 
-/// Loss (eq:mcf_scheme_optimization_discrete) of a mini-batch as a Burn graph.
+/// Loss of the paper of a mini-batch as a Burn graph.
 ///
 /// `parameters`: kernel then activation, flat; `spheres`, `targets`: `[batch, n, .., n]`.
 pub fn loss<const D: usize, const R: usize>(

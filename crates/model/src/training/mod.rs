@@ -1,4 +1,4 @@
-//! Learning the operator from shrinking spheres (alg:mcf_training), in three ways.
+//! Learning the operator from shrinking spheres, in three ways.
 //!
 //! [`adam`] is the paper's: mini-batches of whole grids, refined progressively. [`levenberg_marquardt`] solves the same
 //! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] has another goal, the
@@ -28,7 +28,7 @@ pub struct Progress {
     pub iteration: usize,
     /// Number of planned iterations.
     pub of: usize,
-    /// Loss (eq:mcf_scheme_optimization_discrete) on the training data; of a perceptron that imitates a function its residual.
+    /// Loss of the paper on the training data; of a perceptron that imitates a function its residual.
     pub training_loss: f64,
     /// The same on held-out data, if there are any.
     pub held_out_loss: f64,

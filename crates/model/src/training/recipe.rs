@@ -158,9 +158,9 @@ impl<R: Recipe> Training<'_, R> {
     fn check(&self, device: &ComputeDevice) -> Result<(), Error> {
         /// Vectors of the grid in memory while the quality is measured.
         const VECTORS: f64 = 10.0;
-        if device.dtype() != DType::F64 {
+        if !device.kind().is_cpu() || device.dtype() != DType::F64 {
             return Err(Error::Training(format!(
-                "training needs double precision, which {} does not have here: choose flex or ndarray",
+                "networks are trained in double precision on a CPU, and not by {} here: choose flex or ndarray",
                 device.kind().name()
             )));
         }

@@ -1,4 +1,4 @@
-//! Training data: spheres shrinking by mean curvature (eq:analyticSolutionMCFCircle, eq:analyticSolutionMCFCirclePf).
+//! Training data: spheres shrinking by mean curvature to the radius `R(t) = (r^2 - 2 (D - 1) t)^(1/2)`.
 
 use chacha20::ChaCha8Rng;
 use geometry::exact::mean_curvature_radius;

@@ -1,7 +1,7 @@
 //! Where the minimization of a time step begins.
 
 use burn::tensor::{Slice, Tensor};
-use geometry::{Field, Grid, require};
+use geometry::{Field, Grid, NodeSet, require};
 use model::{Factors, Network, Ratios, Shipped};
 use operators::extrapolate;
 use serde::{Deserialize, Serialize};
@@ -62,15 +62,15 @@ impl<const D: usize> WillmoreFlow<D> {
             })?;
         }
         self.half = Some(Box::new(half));
-        let marks = self.region.as_ref().map(|region| region.marks.clone());
-        marks.map_or(Ok(()), |marks| self.restrict_half(&marks))
+        let nodes = self.region.as_ref().map(|region| region.nodes.clone());
+        nodes.map_or(Ok(()), |nodes| self.restrict_half(&nodes))
     }
 
     /// Restricts the flow on the half grid to a region's nodes there; where it has none, steps do not begin there.
-    pub(super) fn restrict_half(&mut self, nodes: &[bool]) -> Result<(), Error> {
+    pub(super) fn restrict_half(&mut self, nodes: &NodeSet) -> Result<(), Error> {
         if let Some(mut half) = self.half.take() {
             let coarser = every_other_node(self.grid, nodes);
-            if coarser.contains(&true) {
+            if !coarser.is_empty() {
                 half.restrict_to(&coarser)?;
                 self.half = Some(half);
             }
@@ -198,14 +198,14 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 }
 
-/// The marks at the nodes of the half grid.
-fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &[bool]) -> Vec<bool> {
+/// Those that are nodes of the half grid.
+fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &NodeSet) -> NodeSet {
     let marks = nodes.iter().enumerate().filter(|(i, _)| {
         grid.multi_index(*i)
             .iter()
             .all(|index| index.is_multiple_of(2))
     });
-    marks.map(|(_, mark)| *mark).collect()
+    marks.map(|(_, mark)| mark).collect()
 }
 
 /// The ratios of a network for the half grid, with a kernel that reaches equally far.
