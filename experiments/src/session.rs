@@ -40,9 +40,7 @@ impl Stage<'_> {
     }
 
     pub fn finish<const D: usize>(&self, run: &mut Run<D>) -> Result<()> {
-        while run.step()?.is_some() {
-            self.bar.inc(1);
-        }
+        run.advance(None, &mut [&mut self.bar.clone()], &Interrupt::never())?;
         Ok(())
     }
 }

@@ -2,6 +2,7 @@ use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
 use crate::{products, surfaces, timing};
 use geometry::shapes::Capsule;
+use runs::Interrupt;
 
 /// Steps of a comparison with a smaller tolerance, and how much smaller.
 const COMPARED_STEPS: usize = 20;
@@ -139,9 +140,10 @@ fn solid_shape(name: &str, n: usize) -> Result<Field<3>> {
 
 /// Distance of the end of some steps to that with a smaller tolerance, over the way from the start.
 fn distance_to_tighter<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<f64> {
-    let end = |case: Case<D>| -> Result<Field<D>> {
+    let end = |mut case: Case<D>| -> Result<Field<D>> {
+        case.stops.push(Stop::Steps(COMPARED_STEPS));
         let mut run = Run::new(case, device)?;
-        while run.steps() < COMPARED_STEPS && run.step()?.is_some() {}
+        run.advance(None, &mut [], &Interrupt::never())?;
         Ok(run.field().clone())
     };
     let mut tighter = case.clone();
