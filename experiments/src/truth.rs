@@ -337,7 +337,7 @@ pub struct Reached {
     pub seconds: f64,
     /// and steps.
     pub steps: usize,
-    /// The estimated time error of controlled steps; none after fewer than three.
+    /// The estimated time error of controlled steps; none after the first three.
     pub estimated: Option<f64>,
 }
 

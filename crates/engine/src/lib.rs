@@ -27,7 +27,7 @@
 //! # }
 //! ```
 //!
-//! A program of one's own needs an optimised profile, which is not inherited from here: `cargo run --release`, or `opt-level = 3` under
+//! A program of one's own needs an optimized profile, which is not inherited from here: `cargo run --release`, or `opt-level = 3` under
 //! `[profile.dev]` and `[profile.dev.package."*"]` in its `Cargo.toml`. Without, each step takes many times as long.
 //!
 //! A [`Case`] is everything that a result depends on: initial phase field, region, sizes that are held, operator, scales, time steps, stop rules, measures.

@@ -1,4 +1,4 @@
-//! The paper's linear algebra: sparse Cholesky factorizations (faer), for all dimensions alike.
+//! Direct linear solvers, as in the paper's comparison: sparse Cholesky factorizations (faer), for all dimensions alike.
 
 use std::sync::LazyLock;
 

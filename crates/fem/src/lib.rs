@@ -31,11 +31,11 @@
 //! term of the semi-implicit step, which is interpolated at the nodes. Linear systems
 //! are solved by conjugate gradients, preconditioned with the exact inverse in the pure phases by Fourier transforms: the
 //! spectrum of the preconditioned matrix lies in `[(1 - 9/8 s)/(1 + 9/4 s), 1]` with `s = tautilde/eps^2`, independent of the
-//! grid. [`LinearSolver::Direct`] is the sparse Cholesky factorization the paper's comparison used.
+//! grid. [`LinearSolver::Direct`] is a sparse Cholesky factorization, in place of the direct solver (PARDISO) of the paper's comparison.
 //!
 //! # Derivatives
 //!
-//! The implicit step `v[u]` solves `M (v - u) + tautilde S v + kappa b(v) = 0`. With `A(v)` the derivative of the left side in
+//! The implicit step `v[u]` solves `M (v - u) + tautilde S v + tautilde / (2 eps^2) b(v) = 0`, `b_i(v) = int Psi'(v) phi_i`. With `A(v)` the derivative of the left side in
 //! `v`, `v'[u] p = A(v)^-1 M p` and its transpose is `M A(v)^-1`; `A(v)` depends on `v` through `int v^2 phi_i phi_j`. So all
 //! derivatives are compositions of five operations, closed under differentiation: the mass matrix, the inverse of
 //! `M + tautilde S`, the symmetric product `int a b c phi_i`, the step, and `A(v)^-1 g`. Gradients come from Burn's autodiff,
@@ -66,7 +66,7 @@ pub enum LinearSolver {
     /// Conjugate gradients with a Fourier preconditioner.
     #[default]
     ConjugateGradients,
-    /// Sparse Cholesky factorization on two threads, as in the paper's comparison.
+    /// Sparse Cholesky factorization on two threads, in place of the direct solver of the paper's comparison.
     Direct,
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftNum, FftPlanner};
 
-/// Transforms of the lines along the axes of a grid; none is normalised.
+/// Transforms of the lines along the axes of a grid; none is normalized.
 pub struct Plans<T> {
     /// Of the last axis, to the half spectrum.
     pub real: Arc<dyn RealToComplex<T>>,

@@ -40,7 +40,7 @@ pub struct Shared<T: Real> {
     pub(crate) scratch: Mutex<Vec<T>>,
 }
 
-/// The spectrum of a kernel on a grid, normalised, with the data it was made from.
+/// The spectrum of a kernel on a grid, normalized, with the data it was made from.
 pub(crate) struct CachedSymbol<T: Real> {
     pub shape: Vec<usize>,
     pub width: usize,
@@ -87,7 +87,7 @@ impl<T: Real> Shared<T> {
 /// A plan for the real transform of grids of one shape.
 ///
 /// Spectra are stored column by column of the first axis: entry `(c, k0)` at `c * n0 + k0`, where `c` runs over
-/// the (row-major) half spectrum of the remaining axes. Nothing is normalised: `inverse(forward(x)) = N x`, with
+/// the (row-major) half spectrum of the remaining axes. Nothing is normalized: `inverse(forward(x)) = N x`, with
 /// `N` the number of grid points.
 pub struct Transform<T: Real> {
     shape: Vec<usize>,
@@ -146,7 +146,7 @@ impl<T: Real> Transform<T> {
         self.columns * self.shape[0]
     }
 
-    /// The half spectrum of `x`, not normalised.
+    /// The half spectrum of `x`, not normalized.
     pub fn forward(&self, x: &[T]) -> Vec<Complex<T>> {
         let rows = self.slabs_forward(x);
         let n0 = self.shape[0];
@@ -159,7 +159,7 @@ impl<T: Real> Transform<T> {
         spectrum
     }
 
-    /// The real grid with this half spectrum, not normalised.
+    /// The real grid with this half spectrum, not normalized.
     pub fn inverse(&self, spectrum: &[Complex<T>]) -> Vec<T> {
         let mut blocks = self.take();
         self.over_blocks(&mut blocks, &|work, first, chunk| {

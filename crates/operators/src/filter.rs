@@ -91,7 +91,7 @@ impl SpectralFilter {
         }
     }
 
-    /// The symbol at all frequencies, row-major and not normalised, as a tensor.
+    /// The symbol at all frequencies, row-major and not normalized, as a tensor.
     #[cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
     pub(crate) fn on_device(&self, device: &Device, dtype: DType) -> Tensor<1> {
         let mut uploaded = lock(&self.0.uploaded);

@@ -36,7 +36,7 @@ fn roots_of_unity(n: usize, device: &Device, dtype: DType) -> Tensor<1> {
     made
 }
 
-/// Complex transform along the last axes, not normalised. An imaginary part that is absent is zero.
+/// Complex transform along the last axes, not normalized. An imaginary part that is absent is zero.
 fn transform<const R: usize>(
     mut re: Tensor<R>,
     mut im: Option<Tensor<R>>,
@@ -55,7 +55,7 @@ fn forward<const R: usize>(x: Tensor<R>, axes: usize) -> Complex<R> {
     transform(x, None, axes, false)
 }
 
-/// Real part of the normalised inverse transform.
+/// Real part of the normalized inverse transform.
 fn inverse<const R: usize>((re, im): Complex<R>, axes: usize) -> Tensor<R> {
     let points: usize = re.dims()[R - axes..].iter().product();
     transform(re, Some(im), axes, true).0 / points as f64

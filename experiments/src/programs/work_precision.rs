@@ -185,7 +185,7 @@ fn compare<'a, const D: usize>(
 const SAME: f64 = 1e-5;
 
 /// The true time errors of controlled steps, distances to the last and strictest of the runs with the same `eps`, and the ratios of estimated errors to
-/// them. Cases without an estimate, after less than three steps, do not count, nor those that are nearer to the strict run than that is known to be
+/// them. Cases without an estimate, after up to three steps, do not count, nor those that are nearer to the strict run than that is known to be
 /// near the truth.
 fn time_errors<const D: usize>(
     session: &mut Session,

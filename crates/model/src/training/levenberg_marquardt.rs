@@ -330,7 +330,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// The heat kernel of variance `2 tautilde` per axis, sampled and normalised: the kernel of the splitting scheme.
+/// The heat kernel of variance `2 tautilde` per axis, sampled and normalized: the kernel of the splitting scheme.
 pub fn heat_kernel(ratios: Ratios) -> Vec<f64> {
     let mut kernel: Vec<f64> = offsets(ratios.dimension, ratios.width)
         .map(|b| {

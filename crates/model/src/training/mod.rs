@@ -1,7 +1,7 @@
 //! Learning the operator from shrinking spheres, in three ways.
 //!
 //! [`adam`] is the paper's: mini-batches of whole grids, refined progressively. [`levenberg_marquardt`] solves the same
-//! least-squares problem on sampled points and gets to its floor in a minute. [`least_squares`] has another goal, the
+//! least-squares problem on sampled points and gets to its floor in half a minute. [`least_squares`] has another goal, the
 //! same relative accuracy at every curvature, which the calibrated Willmore scheme needs.
 //!
 //! Each is a [`Recipe`]; a [`Training`] runs any of them.

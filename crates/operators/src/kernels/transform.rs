@@ -11,7 +11,7 @@ use super::launch::{like, threads_for, values};
 /// Real and imaginary part.
 type Parts = (CubeTensor, CubeTensor);
 
-/// The Fourier transform along one axis, not normalised; an imaginary part that is absent is zero, and `roots` are those of unity, `cos` and then
+/// The Fourier transform along one axis, not normalized; an imaginary part that is absent is zero, and `roots` are those of unity, `cos` and then
 /// `sin`.
 ///
 /// It is one step of Cooley and Tukey. With `n = a b`, where `a` is the largest divisor up to `sqrt n`, and `k = p + a q` the transform is
