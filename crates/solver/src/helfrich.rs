@@ -21,7 +21,7 @@ const WIDTH: usize = 2 * SECOND_DIFFERENCE.len() - 1;
 /// Part of a second difference in the two [products](DirichletForm) whose difference is the Laplacian on bricks.
 const SMALL: f64 = 1.0 / 128.0;
 
-/// The terms of the energy of Canham and Helfrich, `w = 1/2 int (h - c0)^2 + sigma A + p V`, with `h` the sum of the principal
+/// The terms of the energy of Canham and Helfrich, `w = 1/2 int (kappa - c0)^2 + sigma A + p V`, with `kappa` the sum of the principal
 /// curvatures, positive where the phase `u = 1` is convex (a ball of radius `R` has `(D - 1) / R`), `A` the perimeter, and `V` the volume of that phase.
 ///
 /// All zero is the Willmore energy.
@@ -61,7 +61,7 @@ impl Helfrich {
 ///
 /// `A = int eps/2 |grad u|^2 + Psi(u)/(2 eps)`, `Psi(u) = 9/16 (1 - u^2)^2`,    `V = int (2 + 3 u - u^3)/4`.
 ///
-/// On the optimal profile the derivatives of both by `u` are displacements, `h eps q'` and `eps q'`, so that they do not bend it; see
+/// On the optimal profile the derivatives of both by `u` are displacements, `kappa eps q'` and `eps q'`, so that they do not bend it; see
 /// `docs/algorithm.md`.
 #[derive(Clone, Debug)]
 pub struct HelfrichTerms<const D: usize> {
