@@ -28,6 +28,9 @@ pub const COMMAND: &str = "command";
 /// Longest configuration file, in bytes; all options take some thousand.
 const LONGEST: usize = 1 << 16;
 
+/// Of other options the last one counts; a second one of these might be meant to add to the first.
+const ALONE: [&str; 3] = ["--keep", "--mask", "--label"];
+
 /// The program's options. Negative numbers are values, to be refused for what they are.
 fn program() -> clap::Command {
     Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
@@ -35,6 +38,15 @@ fn program() -> clap::Command {
 
 /// What was typed, together with the configuration file it names.
 pub fn parse(arguments: &[OsString]) -> Result<Cli> {
+    for name in ALONE {
+        let is_given = |argument: &&OsString| {
+            let argument = argument.to_string_lossy();
+            argument.split('=').next() == Some(name)
+        };
+        if arguments.iter().filter(is_given).count() > 1 {
+            refuse!("{name} is given twice, and only the last one would count: give one");
+        }
+    }
     let matches = program().try_get_matches_from(arguments)?;
     if let Some((command, typed)) = matches.subcommand()
         && let Ok(Some(file)) = typed.try_get_one::<PathBuf>("config")

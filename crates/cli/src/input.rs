@@ -456,12 +456,19 @@ impl<'a> Reader<'a> {
         }))
     }
 
-    /// The longest side of what is in the box, a part of that unless it is chosen, so many interface widths from its sides.
+    /// The longest side of what is in the box: at least so many interface widths from its sides, and unless it is chosen a part of the box and
+    /// three times as far.
     fn side<const D: usize>(&mut self, part: f64, room: f64) -> Result<f64> {
         let grid = self.grid::<D>()?;
         let box_side = grid.side();
-        let most = box_side - 2.0 * room * self.eps_over_h * grid.spacing();
-        let usual = (part * box_side).min(most);
+        let within = |room: f64| box_side - 2.0 * room * self.eps_over_h * grid.spacing();
+        let (most, roomy) = (within(room), within(3.0 * room));
+        // On the coarsest grids there is no such room.
+        let usual = if roomy > 0.0 {
+            (part * box_side).min(roomy)
+        } else {
+            most
+        };
         let side = *self.options.side_length.get_or_insert(usual);
         if !(side > 0.0 && side <= most) {
             refuse!(

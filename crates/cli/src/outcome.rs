@@ -7,6 +7,9 @@ use crate::prelude::*;
 /// Measures whose change is told.
 pub const SIZES: [&str; 3] = ["length", "area", "volume"];
 
+/// The energy of a surface over that of a sphere is not below this but for errors of the grid.
+const NO_SURFACE: f64 = 0.95;
+
 /// How far a run has come.
 pub fn progress(steps: usize, time: f64) -> String {
     let plural = if steps == 1 { "" } else { "s" };
@@ -83,6 +86,12 @@ pub fn sentences(outcome: &Value) -> Vec<String> {
         (
             outcome["touches_box"] == true,
             "the shape touches the side of the box: a smaller --side-length gives it room",
+        ),
+        (
+            outcome["touches_box"] == false
+                && outcome["energy_terms"].is_null()
+                && number("energy_over_8_pi").is_some_and(|spheres| spheres < NO_SURFACE),
+            "no closed surface has so little energy: the shape is near to its own periodic image, and a smaller --side-length gives it room",
         ),
     ];
     let holding = notes.into_iter().filter(|(holds, _)| *holds);

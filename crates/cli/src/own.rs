@@ -26,6 +26,9 @@ pub struct OwnMesh {
     /// Whether it keeps its volume, also where vertices simply follow.
     #[serde(default)]
     pub keeps_volume: bool,
+    /// Whether its volume goes to a target, as that of the zero set does.
+    #[serde(default)]
+    pub drives_volume: bool,
     /// Whether the zero level set takes its place in the end.
     #[serde(default)]
     pub is_new: bool,
@@ -206,8 +209,13 @@ impl OwnMesh {
         let fairing = self.fairing();
         let followed = self.followed(start, eps)?;
         let mut moved = fairing.faired(&followed, u)?;
-        if self.keeps_volume {
-            moved = moved.with_volume(rough.volume(), |v| !fairing.kept[v]);
+        let volume = match (self.keeps_volume, self.drives_volume) {
+            (true, _) => Some(rough.volume()),
+            (_, true) => Some(ZeroSet::of(u, eps)?.volume),
+            _ => None,
+        };
+        if let Some(volume) = volume {
+            moved = moved.with_volume(volume, |v| !fairing.kept[v]);
         }
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();

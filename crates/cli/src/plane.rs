@@ -75,7 +75,13 @@ impl Plane {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);
             mask.signed_distance(self.frame.point([column, row])) < 0.0
         };
-        let drawn = (0..picture.pixels().len()).map(is_inside).collect();
+        let drawn: Vec<bool> = (0..picture.pixels().len()).map(is_inside).collect();
+        if !drawn.contains(&true) {
+            refuse!(
+                "--mask contains no pixel of {}: nothing would be drawn",
+                path.display()
+            );
+        }
         self.original = Some(Original { picture, drawn });
         Ok(())
     }

@@ -247,7 +247,10 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         text.extend(outcome::sentences(&outcome));
         let shown = folder.display();
         text.push(if outcome["finished"] == false {
-            format!("interrupted, go on with: willmore resume {shown}")
+            // What was there already is to be written over by whoever goes on, too.
+            let saved = self.options.save.as_deref().is_some_and(Path::exists);
+            let force = if saved { " --force" } else { "" };
+            format!("interrupted, go on with: willmore resume {shown}{force}")
         } else if self.options.no_page {
             format!("results are in {shown}")
         } else {

@@ -77,8 +77,13 @@ impl Presentation<3> for Space {
         if let Some(own) = &self.own {
             return own.faired(start, u, eps, self.up).map(Some);
         }
-        // Sheets that touch each other are no surface from which another one could be far.
-        match ClosedMesh::new(surfaces::phase_field_surface(start, eps)?) {
+        // Sheets that touch each other are no surface from which another one could be far; triangles cut off what is round.
+        let volume = match self.voxels {
+            Some(voxels) => voxels.volume,
+            None => ZeroSet::of(start, eps)?.volume,
+        };
+        let before = surfaces::phase_field_surface(start, eps)?;
+        match ClosedMesh::new(before.with_volume(volume, |_| true)) {
             Ok((before, _)) if before.volume() > 0.0 => {
                 Faired::anew(&before, surface(u, eps)?, self.up).map(Some)
             }

@@ -7,7 +7,7 @@ use chacha20::ChaCha8Rng;
 use geometry::shapes::Ball;
 use geometry::{Grid, npy, phase_field};
 use rand::{RngExt, SeedableRng};
-use surfaces::TriangleMesh;
+use surfaces::{ClosedMesh, TriangleMesh};
 
 use crate::common::{outcome, program, run, text};
 
@@ -138,6 +138,25 @@ fn a_mask_and_a_colour_keep_parts_of_a_mesh_and_the_page_shows_how_far_the_other
 }
 
 /// An octahedron with whole numbers, which are no places to move to.
+/// Its flow begins away from the sides of the box, so that it has the energy of a ball.
+#[test]
+fn a_mesh_has_the_volume_to_which_the_flow_has_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    surfaces::write(at("ball.obj"), &noisy_ball()).unwrap();
+    let target = ["--volume", "95%", "--ramp", "2", "--steps", "3"];
+    let files = ["--cells", "32", "--save", "out.obj"];
+    let ended = outcome(
+        folder.path(),
+        &[&["fair", "ball.obj"][..], &target, &files].concat(),
+    );
+    let number = |name: &str| ended[name].as_f64().unwrap();
+    let (closed, _) = ClosedMesh::new(surfaces::read(at("out.obj")).unwrap()).unwrap();
+    let off = closed.volume() / number("volume") - 1.0;
+    assert!(off.abs() < 1e-6, "{off:e}");
+    assert!((number("energy_over_8_pi") - 1.0).abs() < 0.05, "{ended}");
+}
+
 #[test]
 fn coordinates_that_cannot_change_are_refused_before_the_flow() {
     let folder = tempfile::tempdir().unwrap();

@@ -33,6 +33,14 @@ fn every_mistake_is_one_clear_line() {
     write("simplex.obj", simplex.as_bytes());
     let white = render::Picture::new([8, 8], vec![[255; 4]; 64]).unwrap();
     white.write_png(folder.path().join("white.png")).unwrap();
+    let is_black =
+        |pixel: usize| (8..24).contains(&(pixel % 32)) && (8..24).contains(&(pixel / 32));
+    let pixels = (0..1024).map(|pixel| {
+        let tone = if is_black(pixel) { 0 } else { 255 };
+        [tone, tone, tone, 255]
+    });
+    let square = render::Picture::new([32, 32], pixels.collect()).unwrap();
+    square.write_png(folder.path().join("square.png")).unwrap();
     std::fs::create_dir(folder.path().join("full")).unwrap();
     write("full/mine", b"");
     std::fs::create_dir(folder.path().join("old")).unwrap();
@@ -46,6 +54,20 @@ fn every_mistake_is_one_clear_line() {
             "there is no built-in shape \"teapot\"; there are disc, ",
         ),
         (&["flow", "missing.obj"], "missing.obj"),
+        (
+            &[
+                "fair",
+                "simplex.obj",
+                "--keep",
+                "ball:0,0,0,1",
+                "--keep=ball:1,1,1,1",
+            ],
+            "--keep is given twice",
+        ),
+        (
+            &["inpaint", "square.png", "--mask", "box:40,40,50,50"],
+            "square.png: nothing would be drawn",
+        ),
         (&["flow", "missing.png"], "missing.png"),
         (&["flow", "missing.npy"], "missing.npy"),
         (&["flow", "notes.txt"], "is no input: give a mesh"),

@@ -75,6 +75,14 @@ fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
         "{}",
         mesh.volume()
     );
+    // What is told is the change of what the voxels enclose, and of what a shape does.
+    let sphere = ["flow", "builtin:sphere", "--cells", "32", "--steps", "1"];
+    let kept = ["--volume", "keep", "--output", "kept"];
+    let kept = outcome(folder.path(), &[&sphere[..], &kept].concat());
+    for outcome in [&ended, &kept] {
+        let change = number(&outcome["mesh"], "volume_change_percent");
+        assert!(change.abs() < 1e-4, "{change}");
+    }
     // The options that it has stored make the same run.
     let again = ["fair", "--config", "run/config.toml", "--save", "again.ply"];
     let again = outcome(

@@ -92,8 +92,8 @@ impl Manifest {
     }
 }
 
-/// Commit of the checkout this crate was built from, if it still is there and git knows it; `-modified` is appended if tracked files
-/// differ from it.
+/// Commit of the checkout this crate was built from, if it still is there and git knows it; `-modified` is appended if its code differs from
+/// that. Other tracked files are results, which runs replace.
 fn commit() -> Option<String> {
     let git = |arguments: &[&str]| -> Option<String> {
         let output = Command::new("git")
@@ -105,7 +105,9 @@ fn commit() -> Option<String> {
         Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
     };
     let hash = git(&["rev-parse", "HEAD"])?;
-    let changes = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    let code = [":/crates", ":/experiments", ":/Cargo.toml", ":/Cargo.lock"];
+    let status = ["status", "--porcelain", "--untracked-files=no", "--"];
+    let changes = git(&[&status[..], &code].concat())?;
     let suffix = if changes.is_empty() { "" } else { "-modified" };
     Some(hash + suffix)
 }

@@ -102,10 +102,12 @@ impl FairOptions {
             files::read(path)?
         };
         let noise = self.noise.or(self.ends.then_some(0.0));
+        let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
         let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
         own.check_movable(path)?;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
+        own.drives_volume = to_target || self.flow.reduced_volume.is_some();
         let but = if self.remesh {
             ""
         } else {
@@ -114,8 +116,7 @@ impl FairOptions {
         for warning in warnings {
             messages.warn(&format!("{}: {warning}{but}", path.display()));
         }
-        let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
-        if own.fairing().noise > 0.0 && (to_target || self.flow.reduced_volume.is_some()) {
+        if own.fairing().noise > 0.0 && own.drives_volume {
             refuse!(
                 "the volume stays where noise is taken off: leave out --volume and --reduced-volume, or --noise and say how smooth the surface is \
                  to become, by --energy-ratio, --time, --energy or --steps"
