@@ -213,9 +213,9 @@ fn exponent(measured: &[Measured], name: &str) -> Option<f64> {
 /// Seconds and memory against `n`, a colour for each storage.
 fn figure(measured: &[Measured], steps: usize, device: &ComputeDevice) -> Figure {
     let memory = if device.kind().is_cpu() {
-        "peak memory [MiB]"
+        "largest memory [MiB]"
     } else {
-        "peak memory of the host [MiB]"
+        "memory of the host [MiB]"
     };
     let panel = |title: &str, y: &str, name: &str| {
         let curves = STORAGES.into_iter().enumerate().map(|(colour, storage)| {
