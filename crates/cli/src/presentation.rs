@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::fmt;
 
+use engine::{METRICS, TIMINGS};
 use serde::de::DeserializeOwned;
 
 use crate::faired::Faired;
@@ -134,7 +135,9 @@ pub fn is_written(path: &Path, [shape, last]: &[String; 2]) -> bool {
         return stem.starts_with("step-") && is_stage(name, stem, shape);
     }
     path == Path::new(name)
-        && (is_of_end(name, last) || name == format!("{START}.{shape}") || name == PAGE)
+        && (is_of_end(name, last)
+            || name == format!("{START}.{shape}")
+            || [PAGE, METRICS, TIMINGS].contains(&name))
 }
 
 /// Whether a file shows the shape at a stage of the flow.

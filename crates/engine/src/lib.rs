@@ -83,5 +83,5 @@ pub use solver::Helfrich;
 pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::Stop;
 pub use storage::Storage;
-pub use store::{Checkpoints, METRICS, Store, dimension, ended, initial, notes, records};
+pub use store::{Checkpoints, METRICS, Store, TIMINGS, dimension, ended, initial, notes, records};
 pub use trajectory::Trajectory;

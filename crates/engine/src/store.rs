@@ -18,6 +18,8 @@ use crate::{Case, Error, Flow, Record, Run, Stop};
 
 /// The table of all records in a stored run.
 pub const METRICS: &str = "metrics.csv";
+/// The wall times of all records in a stored run, in seconds: the one file that may differ between two runs of a case.
+pub const TIMINGS: &str = "timings.json";
 
 /// When checkpoints are written.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +108,8 @@ impl Store {
         if let Some(stop) = run.ended() {
             return Err(refused(&stored, stop.to_string()));
         }
-        let directory = stored.reopen(&pack(&run, &notes)?, ends)?;
+        let is_gone = |name: &str| name == METRICS || ends(name);
+        let directory = stored.reopen(&pack(&run, &notes)?, is_gone)?;
         Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 
@@ -124,7 +127,8 @@ impl Store {
         if !(is_due || must) || run.records.len() == self.records {
             return Ok(());
         }
-        self.write_tables(run)?;
+        let table = self.write_timings(run)?;
+        self.directory.replace_file(METRICS, table.as_bytes())?;
         self.directory.commit(&pack(run, &self.notes)?)?;
         (self.last, self.records) = (Instant::now(), run.records.len());
         Ok(())
@@ -132,15 +136,17 @@ impl Store {
 
     /// Writes the last checkpoint of a run that is over, and removes the others.
     pub fn finish<const D: usize>(mut self, run: &Run<D>) -> Result<(), Error> {
-        self.write_tables(run)?;
+        let table = self.write_timings(run)?;
+        self.directory.write_file(METRICS, table.as_bytes())?;
         Ok(self.directory.finish(&pack(run, &self.notes)?)?)
     }
 
-    fn write_tables<const D: usize>(&mut self, run: &Run<D>) -> Result<(), Error> {
+    /// Also gives the table of all records.
+    fn write_timings<const D: usize>(&mut self, run: &Run<D>) -> Result<String, Error> {
         let seconds: Vec<f64> = run.records.iter().map(|record| record.seconds).collect();
-        self.directory.write_timings(&seconds)?;
-        let table = to_csv(&run.records);
-        Ok((self.directory).replace_file(METRICS, table.as_bytes())?)
+        let json = serde_json::to_vec_pretty(&seconds).expect("they are numbers");
+        self.directory.replace_file(TIMINGS, &json)?;
+        Ok(to_csv(&run.records))
     }
 }
 
@@ -167,31 +173,26 @@ pub fn dimension(stored: &StoredRun) -> Result<usize, Error> {
 /// input.
 pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Stored<D>, Option<NodeSet>), Error> {
     let grid = grid(stored)?;
-    let [ranges, marks] = ["region_ranges", "region"].map(|name| stored.state().array(name));
-    let region = match (ranges, marks) {
-        (Some(ends), _) => {
-            let ranges = ends
-                .chunks_exact(2)
-                .map(|ends| ends[0] as usize..ends[1] as usize);
-            let region = NodeSet::from_ranges(grid.len(), ranges);
-            Some(region.ok_or_else(|| unreadable(stored, "its region is none of its grid"))?)
-        }
-        // So earlier versions stored it.
-        (None, marks) => marks.map(|marks| marks.iter().map(|&mark| mark > 0.5).collect()),
-    };
+    let region = stored.state().array("region").map(|ends| {
+        let ranges = ends.chunks_exact(2);
+        let ranges = ranges.map(|ends| ends[0] as usize..ends[1] as usize);
+        NodeSet::from_ranges(grid.len(), ranges)
+            .ok_or_else(|| unreadable(stored, "its region is none of its grid"))
+    });
     let bricks = bricks(stored, "initial_bricks", &grid)?;
     let nodes = bricks.map_or_else(|| grid.into(), |bricks| Nodes::on_bricks(grid, bricks));
     let initial = Stored::from_values(nodes, values(stored, "initial")?);
     let initial = initial.map_err(|error| unreadable(stored, error))?;
-    Ok((initial, region))
+    Ok((initial, region.transpose()?))
 }
 
-/// All records of a stored run with their wall times.
+/// All records of a stored run with their wall times, where those are known.
 pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
-    let mut records: Vec<Record> =
-        serde_json::from_str(&stored.state().text).map_err(|error| unreadable(stored, error))?;
-    for (record, seconds) in records.iter_mut().zip(stored.timings()) {
-        record.seconds = *seconds;
+    let mut records: Vec<Record> = read(stored, &stored.state().notes["records"])?;
+    let timings = stored.read(TIMINGS).unwrap_or_default();
+    let timings: Vec<f64> = serde_json::from_slice(&timings).unwrap_or_default();
+    for (record, seconds) in records.iter_mut().zip(timings) {
+        record.seconds = seconds;
     }
     Ok(records)
 }
@@ -204,6 +205,7 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
         "application": notes,
         "start": run.start,
         "ended": run.ended(),
+        "records": run.records,
         "time": state.time,
         "previous_tau": previous_tau,
     });
@@ -211,7 +213,6 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
     let mut packed = State::new(run.records.len() as u64, notes)
         .with_array("initial", initial.values())
         .with_array("current", state.current);
-    packed.text = serde_json::to_string(&run.records).expect("records are numbers and names");
     let marks = |bricks: &Arc<Bricks<D>>| bricks.marks();
     let optional = [
         ("initial_bricks", initial.nodes().bricks().map(marks)),
@@ -230,7 +231,7 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
     if let Some(region) = &run.case.region {
         let ranges = region.ranges().iter();
         let ends = ranges.flat_map(|range| [range.start as f64, range.end as f64]);
-        packed = packed.with_array("region_ranges", ends.collect::<Vec<f64>>());
+        packed = packed.with_array("region", ends.collect::<Vec<f64>>());
     }
     Ok(packed)
 }
@@ -254,13 +255,6 @@ fn restore<const D: usize>(
     let grid = *case.grid();
     let optional = |name: &str| state.array(name).map(<[f64]>::to_vec);
     let previous_tau: Option<f64> = read(stored, &state.notes["previous_tau"])?;
-    let previous = optional("previous");
-    if previous.is_some() != previous_tau.is_some() {
-        return Err(unreadable(
-            stored,
-            "the step before lacks its size or its phase field",
-        ));
-    }
     let (mut half_motions, mut half) = (Vec::new(), grid);
     while let Some(motion) = optional(&half_motion(half_motions.len())) {
         half = half.half()?;
@@ -269,7 +263,7 @@ fn restore<const D: usize>(
     let at = FlowState {
         bricks: bricks(stored, "bricks", &grid)?,
         current: values(stored, "current")?,
-        previous: previous.zip(previous_tau),
+        previous: optional("previous").zip(previous_tau),
         rate: optional("rate"),
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use files::{Disk, Storage, make_folders_on};
 
-use crate::checkpoint::{self, Files, Kind, State};
+use crate::checkpoint::{self, Files, State};
 use crate::digest::{self, Seal};
 use crate::folder;
 use crate::lock::Lock;
-use crate::{Error, lock, names, timings};
+use crate::{Error, lock, names};
 
 /// A run directory that this process works on. Dropping it gives the lock back; what was not
 /// committed is then forgotten when the run is resumed.
@@ -48,12 +48,10 @@ impl RunDirectory {
         state: &State<'_>,
     ) -> Result<Self, Error> {
         let path = path.into();
-        // What could not be read back is refused before anything is there.
-        checkpoint::start(state, &Files::new(), false)?;
         let mut own = Files::new();
         for &(name, _) in files {
             names::check(name)?;
-            own.insert(name.into(), Kind::Derived(None));
+            own.insert(name.into(), None);
         }
         make_folders_on(&*storage, &path)?;
         check_free(&path, &own)?;
@@ -73,7 +71,6 @@ impl RunDirectory {
             steps: Vec::new(),
             _lock: lock,
         };
-        run.write_timings(&[])?;
         for (name, bytes) in files {
             run.write_file(name, bytes)?;
         }
@@ -86,34 +83,35 @@ impl RunDirectory {
         &self.path
     }
 
-    /// Writes a file under a new name such as `fields/step-0010.vti`; folders are made. It belongs to
-    /// the run from the next commit on, and never changes. After an error the name is free again.
+    /// Writes a file such as `fields/step-0010.vti` under a name that is new, or was [replaced](RunDirectory::replace_file) so far; folders
+    /// are made. It belongs to the run from the next commit on, and never changes. After an error the name is free again.
     pub fn write_file(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        self.check_new(name)?;
+        self.check_open(name)?;
         self.store(name, bytes)?;
         let seal = Seal::of(&self.path.join(name))?;
-        self.files.insert(name.into(), Kind::Written(seal));
+        self.files.insert(name.into(), Some(seal));
         Ok(())
     }
 
     /// Takes up a file that other code has written whole at [`path`](RunDirectory::path)`/name`, as
     /// [`RunDirectory::write_file`] would have. [`Error::Damaged`] if there is no such file.
     pub fn adopt_file(&mut self, name: &str) -> Result<(), Error> {
-        self.check_new(name)?;
-        let seal = self.flushed(name)?;
-        self.files.insert(name.into(), Kind::Written(seal));
+        self.check_open(name)?;
+        let path = self.path.join(name);
+        let (file, folder) = (digest::open(&path)?, path.parent().unwrap_or(&self.path));
+        (self.storage.sync_file(&file, &path))
+            .and_then(|()| self.storage.sync_folder(folder))
+            .map_err(files::Error::of("flush to disk", &path))?;
+        self.files.insert(name.into(), Some(Seal::of(&path)?));
         Ok(())
     }
 
-    /// Writes or replaces a file that is derived from the state, such as `metrics.csv`: a crash
-    /// leaves an old one or the new one. It belongs to the run from the next commit on, but its
-    /// content only once the run is finished.
+    /// Writes or replaces a file that is no result, or not yet, such as wall times: a crash leaves an old one or the new one. It belongs
+    /// to the run from the next commit on, and its content is not checked.
     pub fn replace_file(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        if !matches!(self.files.get(name), Some(Kind::Derived(_))) {
-            self.check_new(name)?;
-        }
+        self.check_open(name)?;
         self.store(name, bytes)?;
-        self.files.insert(name.into(), Kind::Derived(None));
+        self.files.insert(name.into(), None);
         Ok(())
     }
 
@@ -131,18 +129,10 @@ impl RunDirectory {
         Ok(())
     }
 
-    /// Replaces `timings.json`, the one file that may differ between two runs of the same
-    /// computation: wall times, such as those of the steps. It stands outside of the commits, and a crash
-    /// leaves the old one or the new one.
-    pub fn write_timings(&self, seconds: &[f64]) -> Result<(), Error> {
-        let text = timings::encode(seconds)?;
-        self.store(names::TIMINGS, text.as_bytes())
-    }
-
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
     /// checkpoints are kept.
     ///
-    /// The same state may be committed again, for example on an interruption right after a commit.
+    /// The last step may be committed again, for example on an interruption right after a commit.
     /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
     /// on or be opened again.
     pub fn commit(&mut self, state: &State<'_>) -> Result<(), Error> {
@@ -150,33 +140,24 @@ impl RunDirectory {
     }
 
     /// Commits the last state, marks the run as finished, and keeps this checkpoint alone.
-    /// [`Error::Damaged`] if a [derived](RunDirectory::replace_file) file is missing.
     pub fn finish(mut self, state: &State<'_>) -> Result<(), Error> {
-        for name in self.files.keys().cloned().collect::<Vec<_>>() {
-            if let Some(Kind::Derived(_)) = self.files.get(&name) {
-                let seal = self.flushed(&name)?;
-                self.files.insert(name, Kind::Derived(Some(seal)));
-            }
-        }
         // Those in folders that were no part of the run when it was resumed.
         self.remove(folder::is_temporary)?;
         self.commit_as(state, true)
     }
 
     fn commit_as(&mut self, state: &State<'_>, finished: bool) -> Result<(), Error> {
-        let last = self.steps.first().copied();
-        let repeats =
-            || checkpoint::read(&self.path, state.step).map(|(_, old)| old.is_same(state));
-        if last > Some(state.step) || last == Some(state.step) && !repeats()? {
-            return Err(state.refused("a commit is of a later step than the last, or repeats it"));
+        let (last, step) = (self.steps.first().copied(), state.step);
+        if last > Some(step) {
+            let reason = format!("the state of step {step} cannot be committed: a later one is");
+            return Err(Error::Invalid(reason));
         }
-        let start = checkpoint::start(state, &self.files, finished)?;
-        let path = self.path.join(names::checkpoint(state.step));
+        let path = self.path.join(names::checkpoint(step));
         files::write_atomically_on(&*self.storage, path, |out| {
-            checkpoint::write(out, &start, state)
+            checkpoint::write(out, (finished, &self.files, state))
         })?;
-        if last != Some(state.step) {
-            self.steps.insert(0, state.step);
+        if last != Some(step) {
+            self.steps.insert(0, step);
         }
         // Not before the new checkpoint is on the disk.
         let kept = checkpoint::kept(finished).min(self.steps.len());
@@ -187,9 +168,10 @@ impl RunDirectory {
         Ok(())
     }
 
-    fn check_new(&self, name: &str) -> Result<(), Error> {
+    /// Accepts names of files that may still change.
+    fn check_open(&self, name: &str) -> Result<(), Error> {
         names::check(name)?;
-        if self.files.contains_key(name) {
+        if matches!(self.files.get(name), Some(Some(_))) {
             let reason = "the run has it already, and files are written once: choose another name";
             return Err(Error::file(name, reason));
         }
@@ -201,17 +183,6 @@ impl RunDirectory {
         make_folders_on(&*self.storage, path.parent().unwrap_or(&self.path))?;
         let written = files::write_atomically_on(&*self.storage, path, |out| out.write_all(bytes));
         Ok(written?)
-    }
-
-    /// The seal of a file, which then lasts.
-    fn flushed(&self, name: &str) -> Result<Seal, Error> {
-        let path = self.path.join(name);
-        let file = digest::open(&path)?;
-        let folder = path.parent().unwrap_or(&self.path);
-        (self.storage.sync_file(&file, &path))
-            .and_then(|()| self.storage.sync_folder(folder))
-            .map_err(files::Error::of("flush to disk", &path))?;
-        Seal::of(&path)
     }
 }
 

@@ -64,12 +64,6 @@ impl Error {
         }
     }
 
-    /// JSON that a parser has refused; it may quote anything.
-    pub(crate) fn json(path: impl Into<PathBuf>, error: &serde_json::Error) -> Self {
-        let quoted = files::shortened(&error.to_string(), 300);
-        Self::damaged(path, format!("its content is not as expected: {quoted}"))
-    }
-
     pub(crate) fn file(name: &str, reason: &str) -> Self {
         let shown = files::shortened(name, 600);
         Self::Invalid(format!("{shown:?} cannot be stored: {reason}"))

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use files::TEMPORARY_PREFIX;
 
 use crate::checkpoint::Files;
-use crate::names::{self, CHECKPOINTS, LOCK, TIMINGS};
+use crate::names::{self, CHECKPOINTS, LOCK};
 
 /// The steps whose checkpoints are there, in any condition, the newest first.
 pub(crate) fn steps(root: &Path) -> Result<Vec<u64>, files::Error> {
@@ -39,7 +39,7 @@ pub(crate) fn others(
                 let first = files.range(inside.clone()..).next();
                 name == CHECKPOINTS || first.is_some_and(|(name, _)| name.starts_with(&inside))
             } else {
-                [LOCK, TIMINGS].contains(&&*name)
+                name == LOCK
                     || files.contains_key(&name)
                     || names::step(&name).is_some_and(|step| steps.contains(&step))
             };

@@ -15,7 +15,8 @@
 //!         stored => stored?.resume()?,
 //!     };
 //!     while state.step < last {
-//!         state.arrays[0].1.to_mut().iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
+//!         let u = state.arrays.get_mut("u").expect("it is there");
+//!         u.0.to_mut().iter_mut().for_each(|v| *v *= 3.9 * (1.0 - *v));
 //!         state.step += 1;
 //!         if state.step % 3 == 0 {
 //!             run.commit(&state)?;
@@ -35,10 +36,9 @@
 //!
 //! | name | content | written |
 //! |---|---|---|
-//! | `checkpoints/step-00000012.ckpt` | the state, and length and SHA-256 of every file | at each commit, the last two kept |
+//! | `checkpoints/step-00000012.ckpt` | the state, and length and SHA-256 of every file that is written once | at each commit, the last two kept |
 //! | `config.toml`, `fields/`, … | whatever the caller writes | once |
-//! | `metrics.csv`, … | whatever the caller derives from the state | replaced at any time |
-//! | `timings.json` | wall times, and its own SHA-256 | replaced at any time |
+//! | `metrics.csv`, … | whatever the caller replaces at any time | at any time |
 //! | `lock` | nothing; locked while a process works here | once |
 //!
 //! Resuming removes checkpoints and temporary files that are no part of the run; files of others stay.
@@ -48,14 +48,12 @@
 //! - A checkpoint is the commit. Other files are written and flushed before it, so that it describes
 //!   a whole state of the run whenever the process dies. What it does not list was written after it,
 //!   and the computation of a resumed run writes it again.
-//! - A run that is a function of its [`State`] ends with the same bytes in every file but
-//!   `timings.json`, however often it was stopped: only the last checkpoint stays.
-//! - A bit that has flipped in any of the files is noticed when the run is opened, and the file
-//!   named; in files that are replaced at any time, once the run is finished.
+//! - A run that is a function of its [`State`] ends with the same bytes in every file that is written once, however
+//!   often it was stopped: only the last checkpoint stays.
+//! - A bit that has flipped in one of those files is noticed when the run is opened, and the file named.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - Readers never trust a number in a file before its length agrees. They take at most 58 times the
-//!   length of a checkpoint (twice, unless its arrays are constant), twenty times its list of files (64 MiB at most), 160 times its notes (at
-//!   most [`State::MAX_NOTES`]), forty times `timings.json`, and 64 KiB for anything else.
+//! - Readers never trust a number in a file before its length agrees. They take about three times the length of a checkpoint with
+//!   large arrays, and at most 320 times that of its notes (small maps).
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 //!
 //! Whatever touches files fails with [`Error::Io`]; other errors are named where they arise.
@@ -71,9 +69,8 @@ mod interrupt;
 mod lock;
 mod names;
 mod stored;
-mod timings;
 
-pub use checkpoint::State;
+pub use checkpoint::{Array, State};
 pub use directory::RunDirectory;
 pub use error::Error;
 pub use interrupt::Interrupt;

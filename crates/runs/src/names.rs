@@ -3,7 +3,6 @@
 use crate::Error;
 
 pub(crate) const LOCK: &str = "lock";
-pub(crate) const TIMINGS: &str = "timings.json";
 pub(crate) const CHECKPOINTS: &str = "checkpoints";
 
 pub(crate) fn checkpoint(step: u64) -> String {
@@ -34,7 +33,7 @@ pub(crate) fn check(name: &str) -> Result<(), Error> {
     let first = name.split('/').next().unwrap_or(name);
     // Without regard to case, as some systems do not distinguish them.
     let reserved = |own: &&str| own.eq_ignore_ascii_case(first);
-    if [LOCK, TIMINGS, CHECKPOINTS].iter().any(reserved) {
+    if [LOCK, CHECKPOINTS].iter().any(reserved) {
         return Err(Error::file(name, "the run directory uses the name itself"));
     }
     Ok(())

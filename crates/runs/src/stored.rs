@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use files::{Disk, Storage};
 
-use crate::checkpoint::{self, Header, Kind, State};
+use crate::checkpoint::{self, Commit, State};
 use crate::digest::{self, Seal};
-use crate::{Error, RunDirectory, folder, lock, names, timings};
+use crate::{Error, RunDirectory, folder, lock, names};
 
 /// A run that has been opened and checked, and not yet changed. It is locked until dropped.
 #[derive(Debug)]
@@ -15,9 +15,6 @@ pub struct StoredRun {
     run: RunDirectory,
     state: State<'static>,
     finished: bool,
-    timings: Vec<f64>,
-    /// Whether there is damage, which is to be given up.
-    recovered: bool,
     leftovers: Vec<PathBuf>,
 }
 
@@ -32,7 +29,7 @@ impl RunDirectory {
     }
 
     /// Opens a damaged run at the newest commit all of whose files are intact: the last one if
-    /// only the checkpoint before it or the timings are damaged, else the one before it. What
+    /// only the checkpoint before it is damaged, else the one before it. What
     /// came later is given up when the run is resumed, and computed again to the same bits. As
     /// [`RunDirectory::open`] if no commit is intact.
     pub fn recover(path: impl Into<PathBuf>) -> Result<StoredRun, Error> {
@@ -52,30 +49,27 @@ impl StoredRun {
         commits(&path)?;
         let lock = lock::lock(&*storage, &path)?;
         let mut steps = commits(&path)?;
-        let (mut checked, mut recovered) = (check(&path, &mut steps), false);
+        let mut checked = check(&path, &mut steps);
         if let Err(Error::Damaged { fallback, .. }) = &mut checked {
             let intact = steps.iter().find_map(|&step| intact(&path, step).ok());
-            *fallback = intact.as_ref().map(|(_, state)| state.step);
+            *fallback = intact.as_ref().map(|(.., state)| state.step);
             if let Some(intact) = intact.filter(|_| recover) {
-                steps = vec![intact.1.step];
-                recovered = true;
-                checked = Ok((intact, timings::read(&path).unwrap_or_default()));
+                steps = vec![intact.2.step];
+                checked = Ok(intact);
             }
         }
-        let ((header, state), timings) = checked?;
+        let (finished, files, state) = checked?;
         Ok(Self {
-            leftovers: folder::others(&path, &header.files, &steps)?,
-            finished: header.finished,
+            leftovers: folder::others(&path, &files, &steps)?,
+            finished,
             run: RunDirectory {
                 path,
                 storage,
-                files: header.files,
+                files,
                 steps,
                 _lock: lock,
             },
             state,
-            timings,
-            recovered,
         })
     }
 
@@ -94,8 +88,7 @@ impl StoredRun {
         self.finished
     }
 
-    /// The names of the files of the run in alphabetical order, without the checkpoints and
-    /// `timings.json`.
+    /// The names of the files of the run in alphabetical order, without the checkpoints.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         self.run.files.keys().map(String::as_str)
     }
@@ -114,11 +107,6 @@ impl StoredRun {
         text.map_err(|error| Error::damaged(self.run.path.join(name), error.to_string()))
     }
 
-    /// What was last given to [`RunDirectory::write_timings`], in seconds.
-    pub fn timings(&self) -> &[f64] {
-        &self.timings
-    }
-
     /// Files and folders that are not part of the run: left by a process that was killed, or somebody else's.
     pub fn leftovers(&self) -> impl Iterator<Item = &Path> {
         self.leftovers.iter().map(PathBuf::as_path)
@@ -126,9 +114,6 @@ impl StoredRun {
 
     /// Removes old checkpoints and temporary files, which a process that was killed has left, and nothing else.
     pub fn tidy(&self) -> Result<(), Error> {
-        if self.recovered {
-            self.run.write_timings(&self.timings)?;
-        }
         // First the commit becomes the last one: after that, no checkpoint lists a file that is about to be removed.
         let checkpoints = self.run.path.join(names::CHECKPOINTS);
         let is_commit = |path: &Path| names::step(&folder::name(&self.run.path, path)).is_some();
@@ -140,13 +125,8 @@ impl StoredRun {
 
     /// Goes on with the run, also with a finished one. [Leftovers](StoredRun::leftovers) stay until files of the same names are written, but
     /// for those that are [tidied](StoredRun::tidy) away.
-    pub fn resume(mut self) -> Result<(RunDirectory, State<'static>), Error> {
+    pub fn resume(self) -> Result<(RunDirectory, State<'static>), Error> {
         self.tidy()?;
-        for kind in self.run.files.values_mut() {
-            if let Kind::Derived(seal) = kind {
-                *seal = None;
-            }
-        }
         Ok((self.run, self.state))
     }
 
@@ -186,30 +166,26 @@ fn commits(folder: &Path) -> Result<Vec<u64>, Error> {
 }
 
 /// Checks everything. Of the steps, those are left whose checkpoints are part of the run.
-fn check(
-    folder: &Path,
-    steps: &mut Vec<u64>,
-) -> Result<((Header, State<'static>), Vec<f64>), Error> {
+fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<Commit<'static>, Error> {
     let newest = intact(folder, steps[0])?;
-    let kept = checkpoint::kept(newest.0.finished);
+    let kept = checkpoint::kept(newest.0);
     for &older in steps[1..].iter().take(kept - 1) {
         checkpoint::content(folder, older)?;
     }
-    let timings = timings::read(folder)?;
     steps.truncate(kept);
-    Ok((newest, timings))
+    Ok(newest)
 }
 
 /// A checkpoint all of whose files are as they were written.
-fn intact(folder: &Path, step: u64) -> Result<(Header, State<'static>), Error> {
-    let (header, state) = checkpoint::read(folder, step)?;
-    for (name, kind) in &header.files {
+fn intact(folder: &Path, step: u64) -> Result<Commit<'static>, Error> {
+    let commit = checkpoint::read(folder, step)?;
+    for (name, seal) in &commit.1 {
         let path = folder.join(name);
-        if let Kind::Written(seal) | Kind::Derived(Some(seal)) = kind
+        if let Some(seal) = seal
             && Seal::of(&path)? != *seal
         {
             return Err(digest::wrong_checksum(&path));
         }
     }
-    Ok((header, state))
+    Ok(commit)
 }

@@ -242,7 +242,7 @@ fn after_a_failed_commit_the_run_goes_on_or_is_opened_again() {
         assert_eq!(*stored.state(), state_at(9), "{name}");
         let (run, state) = stored.resume().unwrap();
         run.finish(&state).unwrap();
-        let names: Vec<_> = toy::contents(&path).into_keys().collect();
+        let names: Vec<_> = toy::all_contents(&path).into_keys().collect();
         let last = "checkpoints/step-00000009.ckpt";
         let expected = [last, "config.toml", "fields/a", "lock", "manifest.json"];
         assert_eq!(names, expected, "{name}");

@@ -5,21 +5,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use ::fuzzing::{Fuzz, Limit, peak_of};
-use files::{Sha256, hexadecimal};
+use ciborium::Value;
 use runs::{Error, RunDirectory, State, StoredRun};
-use serde_json::{Value, json};
+use serde_json::json;
 use tempfile::TempDir;
 
 use crate::damage::rehashed;
 use crate::toy::{Quick, quick_folder};
 
-/// As documented in the crate, for any parts of the file.
+/// Small maps take most.
 const LIMIT: Limit = Limit {
-    times: 78,
-    plus: 160 * State::MAX_NOTES,
+    times: 320,
+    plus: 1 << 16,
 };
-/// Bytes before the header, and after the arrays.
-const START: usize = 20;
+/// Bytes before what is CBOR, and after it.
+const START: usize = 12;
 const END: usize = 32;
 
 /// A run whose files are changed.
@@ -39,7 +39,6 @@ impl Fixture {
         let storage = Arc::new(Quick);
         let mut run = RunDirectory::create_on(storage, &folder, &files, &state).unwrap();
         run.replace_file("c.csv", b"").unwrap();
-        run.write_timings(&[1.5, 2e-300, 0.0]).unwrap();
         run.finish(&state).unwrap();
         Self {
             _root: root,
@@ -70,63 +69,34 @@ impl Fixture {
         fs::write(self.checkpoint(), bytes).unwrap();
         self.open()
     }
-
-    fn read_timings(&self, bytes: &[u8]) -> Result<StoredRun, Error> {
-        fs::write(self.folder.join("timings.json"), bytes).unwrap();
-        self.open()
-    }
 }
 
-/// Where the header of a checkpoint ends.
-fn header_end(bytes: &[u8]) -> usize {
-    START + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize
+/// The checkpoint with other content, and the checksum that goes with it.
+fn with_content(original: &[u8], change: impl FnOnce(&mut [Value])) -> Vec<u8> {
+    let content = &original[START..original.len() - END];
+    let mut content: Value = ciborium::from_reader(content).unwrap();
+    change(content.as_array_mut().unwrap());
+    let mut bytes = original[..START].to_vec();
+    ciborium::into_writer(&content, &mut bytes).unwrap();
+    rehashed(&[&bytes[..], &[0; END]].concat())
 }
 
-/// The checkpoint with another header or other notes, and all that goes with it.
-fn assembled(original: &[u8], header: &[u8], notes: &[u8]) -> Vec<u8> {
-    let in_notes = u32::from_le_bytes(original[16..20].try_into().unwrap()) as usize;
-    let length = |json: &[u8]| (json.len() as u32).to_le_bytes();
-    let parts = [
-        &original[..12],
-        &length(header),
-        &length(notes),
-        header,
-        notes,
-        &original[header_end(original) + in_notes..],
-    ];
-    rehashed(&parts.concat())
-}
-
-fn with_header(original: &[u8], change: impl FnOnce(&mut Value)) -> Vec<u8> {
-    let end = header_end(original);
-    let mut header = serde_json::from_slice(&original[START..end]).unwrap();
-    change(&mut header);
-    let in_notes = u32::from_le_bytes(original[16..20].try_into().unwrap()) as usize;
-    let notes = &original[end..end + in_notes];
-    assembled(original, &serde_json::to_vec(&header).unwrap(), notes)
+/// The value of a map at a key, which is added if it is not there.
+fn at<'a>(map: &'a mut Value, key: &str) -> &'a mut Value {
+    let map = map.as_map_mut().unwrap();
+    let place = map.iter().position(|(k, _)| k.as_text() == Some(key));
+    let place = place.unwrap_or_else(|| {
+        map.push((key.into(), Value::Null));
+        map.len() - 1
+    });
+    &mut map[place].1
 }
 
 fn fuzz(name: &'static str, original: &[u8]) -> Fuzz<'static> {
-    const WORDS: [&str; 14] = [
-        "null",
-        "[",
-        "]",
-        "{",
-        "{\"a\":",
-        "}",
-        ",",
-        ":",
-        "\"",
-        "1e999",
-        "\"length\":",
-        "\"written\":",
-        "\"derived\":",
-        "true",
-    ];
     Fuzz::new(name, LIMIT)
         .valid([original.to_vec()])
-        .starts([&original[..12]])
-        .words(WORDS)
+        .starts([&original[..START]])
+        .words(["length", "sha256", "step", "notes", "arrays"])
 }
 
 #[test]
@@ -154,85 +124,64 @@ fn fuzzing_a_forged_checkpoint_does_no_harm() {
     let read = |bytes: &[u8]| run.read_checkpoint(bytes);
     let forged = fuzz("forged checkpoints", &original).repair(|bytes| rehashed(&bytes));
     forged.run(read, accepted);
-    // The length of the header, or of the notes, fits again, if the change was there.
-    for (name, at) in [("fitting headers", 12), ("fitting notes", 16)] {
-        let fitting = fuzz(name, &original).repair(|mut bytes| {
-            if bytes.len() > START + END {
-                let grown = bytes.len() as i64 - original.len() as i64;
-                let length = u32::from_le_bytes(original[at..at + 4].try_into().unwrap());
-                let length = (i64::from(length) + grown).max(0) as u32;
-                bytes[at..at + 4].copy_from_slice(&length.to_le_bytes());
-            }
-            rehashed(&bytes)
-        });
-        fitting.run(read, accepted);
-    }
 }
 
 #[test]
-fn fuzzing_changed_timings_are_refused() {
-    let run = Fixture::new();
-    let original = fs::read(run.folder.join("timings.json")).unwrap();
-    let same = |bytes: &[u8], _: StoredRun| assert_eq!(bytes, original);
-    fuzz("timings", &original).run(|bytes| run.read_timings(bytes), same);
-    // Beyond the checksum, which is that of the content: only one text goes with it.
-    let at = "{\n  \"sha256\": \"".len();
-    let resealed = |mut bytes: Vec<u8>| {
-        let middle = "\",\n  \"content\": ".len();
-        if bytes.len() >= at + 64 + middle + 3 {
-            let content = &bytes[at + 64 + middle..bytes.len() - 3];
-            let checksum = hexadecimal(Sha256::of(content));
-            bytes[at..at + 64].copy_from_slice(checksum.as_bytes());
-        }
-        bytes
-    };
-    let forged = fuzz("forged timings", &original).repair(resealed);
-    forged.run(
-        |bytes| run.read_timings(bytes),
-        |bytes, stored| {
-            let timings = stored.timings().to_vec();
-            let (resumed, _) = stored.resume().unwrap();
-            resumed.write_timings(&timings).unwrap();
-            let text = fs::read(run.folder.join("timings.json")).unwrap();
-            assert_eq!(text, bytes);
-        },
-    );
-}
-
-#[test]
-fn a_header_that_contradicts_itself_is_refused() {
+fn content_that_contradicts_itself_is_refused() {
     let run = Fixture::new();
     let original = fs::read(run.checkpoint()).unwrap();
-    let changes: [(&str, fn(&mut Value)); 14] = [
-        ("of step 13", |h| h["step"] = json!(13)),
-        ("not as expected", |h| h["step"] = json!(-1)),
-        ("not as expected", |h| h["finished"] = json!(2)),
-        ("not as expected", |h| h["more"] = json!(2)),
-        ("not as expected", |h| h["files"]["a"]["more"] = json!(2)),
-        ("without names", |h| h["arrays"][1][0] = json!("u")),
-        ("without names", |h| h["arrays"][1][0] = json!("")),
-        ("\"../a\"", |h| h["files"]["../a"] = h["files"]["a"].clone()),
-        ("[[[ ...\"", |h| {
-            h["files"]["[".repeat(10_000)] = h["files"]["a"].clone();
-        }),
-        ("\"Lock\"", |h| h["files"]["Lock"] = h["files"]["a"].clone()),
-        ("is missing", |h| {
-            h["files"]["d"] = h["files"]["a"].clone();
-        }),
-        ("checksum", |h| {
-            h["files"]["a"]["written"]["length"] = json!(4);
-        }),
-        ("checksum", |h| {
-            h["files"]["a"]["written"]["sha256"] = json!("5C");
-        }),
-        ("8 bytes too many", |h| h["arrays"][0][1] = json!(3)),
+    fn file(name: &str) -> impl Fn(&mut [Value]) {
+        move |c| {
+            let a = at(&mut c[1], "a").clone();
+            *at(&mut c[1], name) = a;
+        }
+    }
+    let long = "[".repeat(10_000);
+    type Change<'a> = Box<dyn Fn(&mut [Value]) + 'a>;
+    let changes: [(&str, Change<'_>); 13] = [
+        (
+            "of step 13",
+            Box::new(|c| *at(&mut c[2], "step") = 13.into()),
+        ),
+        (
+            "not as expected",
+            Box::new(|c| *at(&mut c[2], "step") = (-1).into()),
+        ),
+        (
+            "not as expected",
+            Box::new(|c| *at(&mut c[2], "more") = 2.into()),
+        ),
+        (
+            "not as expected",
+            Box::new(|c| *at(&mut c[2], "arrays") = Value::Null),
+        ),
+        ("not as expected", Box::new(|c| c[0] = 2.into())),
+        (
+            "not as expected",
+            Box::new(|c| *at(at(&mut c[1], "a"), "more") = 2.into()),
+        ),
+        (
+            "cut off",
+            Box::new(|c| *at(at(&mut c[2], "arrays"), "u") = Value::Bytes(vec![0; 15])),
+        ),
+        ("\"../a\"", Box::new(file("../a"))),
+        ("[[[ ...\"", Box::new(file(&long))),
+        ("\"Lock\"", Box::new(file("Lock"))),
+        ("is missing", Box::new(file("d"))),
+        (
+            "checksum",
+            Box::new(|c| *at(at(&mut c[1], "a"), "length") = 4.into()),
+        ),
+        (
+            "checksum",
+            Box::new(|c| *at(at(&mut c[1], "a"), "sha256") = "5C".into()),
+        ),
     ];
-    drop(
-        run.read_checkpoint(&with_header(&original, |_| {}))
-            .unwrap(),
-    );
+    let same = with_content(&original, |_| {});
+    assert_eq!(same, original);
+    drop(run.read_checkpoint(&same).unwrap());
     for (reason, change) in changes {
-        let refused = run.read_checkpoint(&with_header(&original, change));
+        let refused = run.read_checkpoint(&with_content(&original, change));
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(reason), "{message} instead of {reason}");
         ::fuzzing::assert_short_line(&message);
@@ -243,30 +192,33 @@ fn a_header_that_contradicts_itself_is_refused() {
 fn lengths_that_no_file_backs_are_refused() {
     let run = Fixture::new();
     let original = fs::read(run.checkpoint()).unwrap();
-    for length in [5u64, 1 << 20, 1 << 40, 1 << 60, 1 << 61, u64::MAX] {
-        let bytes = with_header(&original, |h| h["arrays"][0][1] = json!(length));
-        let (refused, peak) = peak_of(|| run.read_checkpoint(&bytes));
+    // Four numbers: a string of 32 bytes.
+    let start = [&[0x58, 32], &0.1_f64.to_le_bytes()[..]].concat();
+    let place = original.windows(start.len()).position(|w| w == start);
+    let (before, after) = original.split_at(place.unwrap());
+    for length in [1u64 << 20, 1 << 40, 1 << 60, 1 << 61, u64::MAX] {
+        let bytes = [before, &[0x5b], &length.to_be_bytes(), &after[2..]].concat();
+        let (refused, peak) = peak_of(|| run.read_checkpoint(&rehashed(&bytes)));
         let message = refused.unwrap_err().to_string();
-        assert!(message.contains("ends early"), "{message}");
+        assert!(message.contains("not as expected"), "{message}");
         assert!(peak < 1 << 16, "{peak}");
     }
-    for at in [12, 16] {
-        let mut bytes = original.clone();
-        bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-        let refused = run.read_checkpoint(&rehashed(&bytes));
-        let message = refused.unwrap_err().to_string();
-        assert!(message.contains("4294967295"), "{message}");
-    }
+    let more = [&original[..original.len() - END], &[0; END + 3]].concat();
+    let message = run.read_checkpoint(&rehashed(&more)).unwrap_err();
+    assert!(
+        message.to_string().contains("3 bytes too many"),
+        "{message}"
+    );
 }
 
 #[test]
-fn arrays_come_back_bit_for_bit_and_constants_take_little() {
+fn arrays_come_back_bit_for_bit() {
     let root = quick_folder();
     let folder = root.path().join("run");
     let mut values = vec![-1.0; 10_000];
     (values[64], values[5000]) = (0.3, f64::NAN);
     values.extend([0.0, -0.0]);
-    let state = State::new(3, Value::Null)
+    let state = State::new(3, json!(null))
         .with_array("u", values)
         .with_array("nothing", vec![])
         .with_array("v", vec![-0.0; 65]);
@@ -275,62 +227,42 @@ fn arrays_come_back_bit_for_bit_and_constants_take_little() {
     let bits = |state: &State| -> Vec<Vec<u64>> {
         let arrays = state.arrays.iter();
         arrays
-            .map(|(_, values)| values.iter().map(|v| v.to_bits()).collect())
+            .map(|(_, values)| values.0.iter().map(|v| v.to_bits()).collect())
             .collect()
     };
     assert_eq!(bits(stored.state()), bits(&state));
-    let file = folder.join("checkpoints/step-00000003.ckpt");
-    assert!(fs::metadata(file).unwrap().len() < 4000);
 }
 
-/// Headers and notes that make the most of every byte.
+/// Content that makes the most of every byte.
 #[test]
 fn the_worst_files_stay_within_the_limit() {
     let run = Fixture::new();
     let original = fs::read(run.checkpoint()).unwrap();
-    let header = &original[START..header_end(&original)];
-    // Maps take most: a node of a tree for every one, however small.
-    let maps = format!("{}0{},", "{\"\":".repeat(100), "}".repeat(100));
-    for block in ["0,", "[],", "{},", "\"\",", "{\"\":0},", &maps] {
-        let length = State::MAX_NOTES - 100;
-        let notes = format!("[{}0]", block.repeat(length / block.len()));
-        let bytes = assembled(&original, header, notes.as_bytes());
-        let (result, peak) = peak_of(|| run.read_checkpoint(&bytes));
-        println!("notes of {block:.20}: {peak} bytes");
-        assert!(result.is_ok());
-        assert!(peak <= LIMIT.plus + 2 * bytes.len(), "{block}: {peak}");
-    }
-    let digits = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
-    let name = |k: usize| -> String {
-        let digit = |n: usize| char::from(digits[n % digits.len()]);
-        [digit(k / 3844), digit(k / 62), digit(k)].iter().collect()
+    let many = |each: Value| vec![each; 100_000];
+    let small = || Value::Map(vec![("".into(), 0.into())]);
+    let deep = (0..100).fold(0.into(), |inner: Value, _| {
+        Value::Map(vec![("".into(), inner)])
+    });
+    let named = |each: Value| {
+        let entries = (0..100_000).map(|k| (format!("{k:x}").into(), each.clone()));
+        Value::Map(entries.collect())
     };
-    let many = |change: &dyn Fn(&mut Value)| with_header(&original, change);
-    let constant = many(&|h| h["arrays"][1][1] = json!(64 * 10_000));
-    let blocks = [0; 9].repeat(10_000);
-    let constant = [&constant[..constant.len() - END], &blocks, &[0; END]].concat();
-    for bytes in [
-        rehashed(&constant),
-        many(&|h| {
-            for k in 0..200_000 {
-                h["files"][name(k)] = json!({ "derived": null });
-            }
-        }),
-        many(&|h| {
-            let arrays = h["arrays"].as_array_mut().unwrap();
-            arrays.extend((0..200_000).map(|k| json!([name(k), 0])));
-        }),
-    ] {
+    let changes: [(&str, usize, Value); 6] = [
+        ("notes", 2, many(0.into()).into()),
+        ("notes", 2, many("".into()).into()),
+        ("notes", 2, many(small()).into()),
+        ("notes", 2, vec![deep; 1000].into()),
+        ("arrays", 2, named(Value::Bytes(Vec::new()))),
+        ("files", 1, named(Value::Null)),
+    ];
+    for (what, place, value) in changes {
+        let bytes = with_content(&original, |c| match what {
+            "files" => c[place] = value,
+            what => *at(&mut c[place], what) = value,
+        });
         let (result, peak) = peak_of(|| run.read_checkpoint(&bytes));
-        println!("{} bytes: {peak}", bytes.len());
+        println!("{} bytes of {what}: {peak}", bytes.len());
         assert!(result.is_ok(), "{result:?}");
         assert!(peak <= LIMIT.times * bytes.len(), "{peak}");
     }
-    fs::write(run.checkpoint(), &original).unwrap();
-    let seconds = "0,".repeat(500_000);
-    let timings = format!(r#"{{"sha256":"","content":{{"seconds":[{seconds}0]}}}}"#);
-    let (result, peak) = peak_of(|| run.read_timings(timings.as_bytes()));
-    println!("{} bytes of timings: {peak}", timings.len());
-    assert!(result.is_err());
-    assert!(peak <= 40 * timings.len(), "{peak}");
 }

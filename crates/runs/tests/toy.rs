@@ -55,21 +55,21 @@ fn beginning() -> State<'static> {
 fn step(state: &mut State) {
     state.step += 1;
     let time = state.notes["time"].as_f64().unwrap() + 0.1;
-    let u = state.arrays[0].1.to_mut();
+    let u = state.arrays.get_mut("u").unwrap().0.to_mut();
     for v in u.iter_mut() {
         *v *= 3.9 * (1.0 - *v);
     }
     let mean = u.iter().sum::<f64>() / CELLS as f64;
     let largest = state.notes["largest"].as_f64().unwrap().max(mean);
     state.notes = json!({ "time": time, "largest": largest });
-    state.arrays[1].1.to_mut().push(mean);
+    let means = state.arrays.get_mut("means").unwrap();
+    means.0.to_mut().push(mean);
 }
 
-fn write_metrics(run: &mut RunDirectory, state: &State) -> Result<(), Error> {
+fn metrics(state: &State) -> String {
     let means = state.array("means").unwrap();
     let rows = (means.iter().zip(1..)).map(|(mean, step)| format!("{step},{mean}\n"));
-    let table = "step,mean\n".to_owned() + &rows.collect::<String>();
-    run.replace_file("metrics.csv", table.as_bytes())
+    "step,mean\n".to_owned() + &rows.collect::<String>()
 }
 
 pub fn state_at(step_number: u64) -> State<'static> {
@@ -133,7 +133,11 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         std::thread::sleep(toy.pause);
         if state.step.is_multiple_of(10) {
             let name = format!("fields/step-{:04}.raw", state.step);
-            let values = state.arrays[0].1.iter().flat_map(|v| v.to_le_bytes());
+            let values = state
+                .array("u")
+                .unwrap()
+                .iter()
+                .flat_map(|v| v.to_le_bytes());
             let bytes: Vec<u8> = values.collect();
             run.write_file(&name, &bytes)?;
         }
@@ -147,10 +151,11 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         }
         let interrupted = toy.interrupt.requested();
         if state.step.is_multiple_of(3) || interrupted {
-            write_metrics(&mut run, &state)?;
+            run.replace_file("metrics.csv", metrics(&state).as_bytes())?;
+            let id = std::process::id().to_string();
+            run.replace_file("timings.json", id.as_bytes())?;
             run.commit(&state)?;
             toy.committed.set(Some(state.step));
-            run.write_timings(&[f64::from(std::process::id())])?;
         }
         if interrupted {
             return Ok(());
@@ -158,7 +163,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
     }
     if toy.stop >= STEPS {
         run.write_file("figures/mean.svg", format!("{}\n", state.notes).as_bytes())?;
-        write_metrics(&mut run, &state)?;
+        run.write_file("metrics.csv", metrics(&state).as_bytes())?;
         run.finish(&state)?;
         toy.committed.set(Some(state.step));
     }
