@@ -564,12 +564,12 @@ impl RunCommand {
 
 impl MessageOptions {
     /// Prints the outcome of a command: an object, or a text for people.
-    pub fn report(self, outcome: &Value, text: &str) {
+    pub fn report(self, outcome: &Value, text: &str) -> Result<()> {
         let shown: &dyn Display = if self.json { outcome } else { &text };
-        if !self.to_pipe && (self.json || !self.quiet) {
-            // A closed pipe (`| head`) is no reason to fail after the results have been written.
-            let _ = writeln!(std::io::stdout(), "{shown}");
+        if self.to_pipe || self.quiet && !self.json {
+            return Ok(());
         }
+        write_out(format!("{shown}\n").as_bytes())
     }
 
     pub fn warn(self, what: &str) {
@@ -587,6 +587,16 @@ impl MessageOptions {
 
     pub fn progress(self) -> Progress {
         Progress::new(self.quiet || self.json || self.to_pipe)
+    }
+}
+
+/// Writes to standard output. A closed pipe (`| head`) is no failure.
+pub fn write_out(text: &[u8]) -> Result<()> {
+    match std::io::stdout().write_all(text) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(files::Error::of("write", "standard output")(error).into())
+        }
+        _ => Ok(()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Inputs as phase fields.
 
+use engine::{Flow, Storage};
 use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, Side, Tones};
@@ -194,6 +195,8 @@ pub struct Reader<'a> {
     pub source: Source,
     /// Whether thin parts may be lost on the grid, if there is an option that says so.
     pub allows_loss: Option<bool>,
+    /// The flow that will store the whole grid, if one will, and where: its memory is looked at before anything takes long.
+    pub whole: Option<(DeviceKind, Flow)>,
     options: &'a mut InputOptions,
     /// The cells per unit length that were chosen, if any; the options may hold others that are tried.
     chosen: Option<usize>,
@@ -226,6 +229,7 @@ impl<'a> Reader<'a> {
         Ok(Self {
             source,
             allows_loss: None,
+            whole: None,
             chosen: options.cells,
             options,
             eps_over_h,
@@ -266,6 +270,9 @@ impl<'a> Reader<'a> {
             refuse!(
                 "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
             );
+        }
+        if let Some((device, flow)) = self.whole {
+            Storage::check(device, flow, &grid, grid.len(), flow == Flow::Willmore)?;
         }
         Ok(grid)
     }

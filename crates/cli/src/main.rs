@@ -64,10 +64,7 @@ fn execute(mut cli: Cli) -> Result<()> {
         Command::Sample(options) => sample::run(options, messages),
         Command::Check(options) => check::run(options, messages),
         Command::Train(options) => train::run(options, messages),
-        Command::Completions { shell } => {
-            about::completions(shell);
-            Ok(())
-        }
+        Command::Completions { shell } => about::completions(shell),
         Command::Man => about::man(),
     }?;
     standard.write()

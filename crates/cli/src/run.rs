@@ -91,7 +91,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
         bar.finish();
         progress.clear();
-        self.tell(&run, outcome, &folder, seconds);
+        self.tell(&run, outcome, &folder, seconds)?;
         ended.map(|_| ()).ok_or(Error::Interrupted)
     }
 
@@ -237,7 +237,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
     }
 
-    fn tell(&self, run: &Run<D>, mut outcome: Value, folder: &Path, seconds: f64) {
+    fn tell(&self, run: &Run<D>, mut outcome: Value, folder: &Path, seconds: f64) -> Result<()> {
         let (progress, ended) = (outcome::progress(run.steps(), run.time()), run.ended());
         let reason = match ended {
             None | Some(Stop::Steps(_)) => String::new(),
@@ -262,7 +262,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         }
         outcome["run"] = folder.to_string_lossy().into();
         outcome["seconds"] = seconds.into();
-        self.messages.report(&outcome, &text.join("\n"));
+        self.messages.report(&outcome, &text.join("\n"))
     }
 }
 

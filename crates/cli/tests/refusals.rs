@@ -478,6 +478,41 @@ fn every_mistake_is_one_clear_line() {
     }
 }
 
+/// A whole grid of this size takes 291 GB, which is said before the distances from the mesh, and not after them.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_does_not_fit_into_memory_is_refused_before_it_takes_long() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "flow builtin:figure --cells 990 --storage dense --output run";
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let output = run(folder.path(), &arguments);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(
+        stderr.contains("needs about 291.1 GB of memory"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("or bricks near the surface"), "{stderr}");
+    assert!(!stderr.contains("signed distance"), "{stderr}");
+    assert!(!folder.path().join("run").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_outcome_that_cannot_be_printed_is_a_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    let mut command = common::program(folder.path());
+    let output = command.args(["info", "--json"]).stdout(full.unwrap());
+    let output = output.output().unwrap();
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(
+        stderr.contains("could not write standard output"),
+        "{stderr}"
+    );
+}
+
 #[test]
 fn help_has_examples_and_exit_codes() {
     let folder = tempfile::tempdir().unwrap();

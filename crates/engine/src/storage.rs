@@ -40,9 +40,9 @@ impl Storage {
         each * stored as f64
     }
 
-    /// Refuses a flow of which so many cells of a grid are stored if the memory of the CPU is too small for it. Limits of containers are
-    /// not looked at.
-    pub(crate) fn check<const D: usize>(
+    /// Refuses a flow of which so many cells of a grid are stored, and which may take bricks or not, if the memory of the CPU is too small for it
+    /// ([`Error::Memory`]). Limits of containers are not looked at.
+    pub fn check<const D: usize>(
         device: DeviceKind,
         flow: Flow,
         grid: &Grid<D>,

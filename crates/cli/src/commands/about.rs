@@ -1,13 +1,12 @@
 //! What the program says of itself: `willmore info`, `networks`, `completions` and `man`.
 
 use std::fmt::Write as _;
-use std::io::Write;
 
 use clap::CommandFactory;
 use clap_complete::Shell;
 use model::{Network, Shipped};
 
-use crate::cli::{Cli, MessageOptions, NetworksCommand};
+use crate::cli::{Cli, MessageOptions, NetworksCommand, write_out};
 use crate::prelude::*;
 
 pub fn info(messages: MessageOptions) -> Result<()> {
@@ -37,8 +36,7 @@ pub fn info(messages: MessageOptions) -> Result<()> {
         "devices": devices,
         "networks": { "accurate": accurate, "paper": paper },
     });
-    messages.report(&outcome, &text);
-    Ok(())
+    messages.report(&outcome, &text)
 }
 
 pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<()> {
@@ -51,8 +49,7 @@ pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Res
                 (line, about(&name, network))
             })
             .unzip();
-        messages.report(&Value::Array(list), &lines.join("\n"));
-        return Ok(());
+        return messages.report(&Value::Array(list), &lines.join("\n"));
     };
     let path = Path::new(wanted);
     let network = match all.find(|(name, _)| *name == stem(wanted)) {
@@ -66,8 +63,7 @@ pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Res
         }
     };
     let about = about(&stem(wanted), network);
-    messages.report(&about, &format!("{about:#}"));
-    Ok(())
+    messages.report(&about, &format!("{about:#}"))
 }
 
 fn about(name: &str, network: &Network) -> Value {
@@ -84,10 +80,10 @@ fn stem(name: &str) -> String {
     name.trim_end_matches(".safetensors").to_owned()
 }
 
-pub fn completions(shell: Shell) {
+pub fn completions(shell: Shell) -> Result<()> {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
-    print(&text);
+    write_out(&text)
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
@@ -101,11 +97,5 @@ pub fn man() -> Result<()> {
             .render(&mut text)
             .map_err(files::Error::of("make the manual page of", page.get_name()))?;
     }
-    print(&text);
-    Ok(())
-}
-
-fn print(text: &[u8]) {
-    // A closed pipe (`| head`) is no failure.
-    let _ = std::io::stdout().write_all(text);
+    write_out(&text)
 }

@@ -44,7 +44,7 @@ pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
     let text: Vec<String> = findings.iter().map(line).collect();
     let outcome =
         json!({ "command": "check", "device": options.common.device, "checks": findings });
-    messages.report(&outcome, &text.join("\n"));
+    messages.report(&outcome, &text.join("\n"))?;
     let failed = findings.iter().filter(|finding| !finding.passed);
     let failed: Vec<&str> = failed.map(|finding| finding.name).collect();
     if !failed.is_empty() {

@@ -1,6 +1,6 @@
 //! `willmore flow`, and what it has in common with the other commands that make runs.
 
-use engine::Store;
+use engine::{Flow, Storage, Store};
 
 use crate::case::with_round_edges;
 use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
@@ -56,7 +56,17 @@ impl RunCommand {
 impl RunOptions {
     /// Reads the input.
     pub fn reader(&mut self, messages: MessageOptions) -> Result<Reader<'_>> {
-        Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)
+        let mut reader = Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)?;
+        let device = self
+            .common
+            .device
+            .as_deref()
+            .and_then(|name| name.parse().ok());
+        let is_dense = self.scheme.storage == Some(Storage::Dense);
+        reader.whole = device
+            .filter(|_| is_dense)
+            .map(|device| (device, Flow::Willmore));
+        Ok(reader)
     }
 }
 
@@ -123,6 +133,11 @@ pub fn run(
     let loaded = match &mut job.command {
         RunCommand::Fair(fair) => fair.load(messages),
         RunCommand::Inpaint(inpaint) => inpaint.load(messages),
+        RunCommand::Mcf(mcf) => {
+            let mut reader = mcf.run.reader(messages)?;
+            reader.whole = Some((job.device.kind(), Flow::MeanCurvature));
+            reader.load()
+        }
         command => command.options().reader(messages)?.load(),
     };
     match loaded? {

@@ -38,6 +38,5 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
         stop => stop.map_or(String::new(), |stop| format!(": {stop}")),
     };
     let text = format!("The run in {folder} is finished already{advice}");
-    messages.report(&outcome, &text);
-    Ok(())
+    messages.report(&outcome, &text)
 }

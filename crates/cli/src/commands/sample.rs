@@ -75,8 +75,7 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
         }
     }
     let outcome = json!({ "command": "sample", "file": path.to_string_lossy() });
-    messages.report(&outcome, &format!("wrote {shown}"));
-    Ok(())
+    messages.report(&outcome, &format!("wrote {shown}"))
 }
 
 fn eps<const D: usize>(u: &Field<D>) -> f64 {

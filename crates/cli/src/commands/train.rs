@@ -68,6 +68,5 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     });
     let shown = save.display();
     let text = format!("{ratios}: held-out loss {loss:.2e}; written to {shown}");
-    messages.report(&outcome, &text);
-    Ok(())
+    messages.report(&outcome, &text)
 }
