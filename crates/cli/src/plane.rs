@@ -3,6 +3,7 @@
 use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
+use crate::cli::MessageOptions;
 use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -65,11 +66,18 @@ impl Plane {
     }
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
-    pub fn repair(&mut self, mask: &dyn SignedDistance<2>) -> Result<()> {
+    pub fn repair(&mut self, mask: &dyn SignedDistance<2>, messages: MessageOptions) -> Result<()> {
         let Some(path) = &self.image else {
             return Ok(());
         };
-        let picture = images::colours(path, &files::read(path)?)?;
+        let bytes = files::read(path)?;
+        let picture = images::colours(path, &bytes)?;
+        if images::is_deep(&bytes) {
+            messages.warn(&format!(
+                "{} has more than 8 bits for a tone; the repaired image has 8",
+                path.display()
+            ));
+        }
         let width = self.frame.size()[0] as usize;
         let is_inside = |pixel: usize| {
             let [column, row] = [pixel % width, pixel / width].map(|i| i as f64 + 0.5);

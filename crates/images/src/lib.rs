@@ -75,6 +75,6 @@ pub use frame::Frame;
 pub use image::Image;
 pub use limits::{LARGEST_IMAGE, LARGEST_OUTLINE};
 pub use outline::Outline;
-pub use read::{colours, decode, read};
+pub use read::{colours, decode, is_deep, read};
 pub use selection::{Side, Tones};
 pub use svg::svg;

@@ -69,6 +69,14 @@ pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
     picture.map_err(|error| format(FormatError::damaged("image", &error.to_string())))
 }
 
+/// Whether the image in the bytes of a file has more than 8 bits for a value, which [`colours`] leaves out.
+pub fn is_deep(bytes: &[u8]) -> bool {
+    upright(bytes, Tones::Colours).is_ok_and(|image| {
+        let colour = image.color();
+        colour.bytes_per_pixel() > colour.channel_count()
+    })
+}
+
 /// What is wanted of an image.
 #[derive(Clone, Copy, PartialEq)]
 enum Tones {

@@ -1,7 +1,9 @@
 //! What tells drawings from photographs, and the raster from the shape.
 
 use geometry::SignedDistance;
-use images::{Image, Outline, Side, Tones, colours};
+use images::{Image, Outline, Side, Tones, colours, is_deep};
+
+use crate::common::png_with;
 
 const PIXELS: u32 = 160;
 
@@ -102,6 +104,13 @@ fn colours_are_those_of_the_file() {
             "{pixel:?}"
         );
     }
+    let deep = |depth, data: &[u8]| {
+        let bytes = png_with([1, 1], png::ColorType::Rgb, depth, data, |_| {});
+        is_deep(&bytes)
+    };
+    assert!(deep(png::BitDepth::Sixteen, &[1, 2, 3, 4, 5, 6]));
+    assert!(!deep(png::BitDepth::Eight, &[1, 2, 3]));
+    assert!(!is_deep(&jpeg));
     let error = colours("x.png", b"no image").unwrap_err();
     assert!(error.to_string().starts_with("x.png"), "{error}");
 }

@@ -26,7 +26,7 @@ impl InpaintOptions {
                 } else {
                     start.presentation.mask(mask, start.initial.grid())?
                 };
-                start.presentation.repair(shape.as_ref())?;
+                start.presentation.repair(shape.as_ref(), messages)?;
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
             Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
