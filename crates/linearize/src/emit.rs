@@ -8,10 +8,10 @@ use std::hash::{Hash, Hasher};
 
 use burn::backend::ir::{
     BaseOperationIr as Base, BinaryOpIr, CreationOpIr, FloatOperationIr as Float, FullOpIr,
-    NumericOperationIr as Num, OperationIr, ScalarIr, ScalarOpIr, ShapeOpIr, SliceAssignOpIr,
-    TensorId, TensorIr, UnaryOpIr,
+    NumericOperationIr as Num, OperationIr, ScalarIr, ScalarOpIr, ShapeOpIr, TensorId, TensorIr,
+    UnaryOpIr,
 };
-use burn::tensor::{DType, Shape, Slice};
+use burn::tensor::{DType, Shape};
 
 use crate::ir::{detach_outputs, like, output, read_only, rename, tensor};
 
@@ -297,38 +297,7 @@ impl Emitter {
                 return self.sub(a, &negated);
             }
         }
-        if let Some(joined) = self.join(a, b) {
-            return joined;
-        }
         self.binary(a, b, shape, Num::Add)
-    }
-
-    /// `a + b` without an addition, if both are blocks put into zeros and the blocks do not overlap:
-    /// the second block can be put into the first tensor. Gradients of shifts are full of these.
-    pub(crate) fn join(&mut self, a: &TensorIr, b: &TensorIr) -> Option<TensorIr> {
-        if a.shape != b.shape {
-            return None;
-        }
-        let (first, second) = (self.block_in_zeros(a)?, self.block_in_zeros(b)?);
-        if !disjoint(&first.ranges, &second.ranges) {
-            return None;
-        }
-        let joined = SliceAssignOpIr {
-            tensor: read_only(a),
-            ..second.clone()
-        };
-        Some(self.emit_one(OperationIr::BaseFloat(Base::SliceAssign(joined))))
-    }
-
-    fn block_in_zeros(&self, t: &TensorIr) -> Option<&SliceAssignOpIr> {
-        match self.definition(t) {
-            Some(OperationIr::BaseFloat(Base::SliceAssign(block)))
-                if self.constant(&block.tensor) == Some(0.0) =>
-            {
-                Some(block)
-            }
-            _ => None,
-        }
     }
 
     pub(crate) fn sub(&mut self, a: &TensorIr, b: &TensorIr) -> TensorIr {
@@ -523,18 +492,6 @@ fn by_number(t: &TensorIr, number: ScalarIr) -> ScalarOpIr {
         rhs: number,
         out: like(t),
     }
-}
-
-/// Whether two blocks are certain not to overlap: they do not along some axis.
-fn disjoint(a: &[Slice], b: &[Slice]) -> bool {
-    a.iter().zip(b).any(|(a, b)| {
-        let (Some(a_end), Some(b_end)) = (a.end, b.end) else {
-            return false;
-        };
-        let forward = a.step > 0 && b.step > 0;
-        let from_start = a.start >= 0 && b.start >= 0 && a_end >= 0 && b_end >= 0;
-        forward && from_start && (a_end <= b.start || b_end <= a.start)
-    })
 }
 
 /// Shape of an elementwise operation of two tensors of equal rank.

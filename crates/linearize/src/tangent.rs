@@ -222,8 +222,7 @@ impl Builder {
 
     /// Evaluate.
     pub(crate) fn exactly(&mut self, e: Expression) -> TensorIr {
-        let terms = self.grouped(e.terms);
-        let mut terms = self.joined(terms);
+        let mut terms = self.grouped(e.terms);
         // Signs go into additions and subtractions; begin with a positive term.
         if let Some(first) = terms.iter().position(|t| t.factor > 0.0) {
             let first = terms.remove(first);
@@ -296,28 +295,6 @@ impl Builder {
                 }
             })
             .collect()
-    }
-
-    /// Join blocks put into zeros.
-    fn joined(&mut self, mut terms: Vec<Term>) -> Vec<Term> {
-        let mut i = 0;
-        while i < terms.len() {
-            let candidate = terms[i].clone();
-            let partner = (i + 1..terms.len()).find_map(|j| {
-                let other = &terms[j];
-                let alike = candidate.coefficient.is_none()
-                    && other.coefficient.is_none()
-                    && candidate.factor.to_bits() == other.factor.to_bits();
-                let joined = alike.then(|| self.tangent.join(&candidate.atom, &other.atom));
-                joined.flatten().map(|atom| (j, atom))
-            });
-            if let Some((j, atom)) = partner {
-                terms.remove(j);
-                terms[i].atom = atom;
-            }
-            i += 1;
-        }
-        terms
     }
 
     /// The tangent as a tensor, zeros if there is none.

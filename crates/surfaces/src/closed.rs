@@ -5,7 +5,7 @@ use geometry::measure::BoundingBox;
 use geometry::{Placement, require};
 use rayon::prelude::*;
 
-use crate::half_edges::next;
+use crate::half_edges::HalfEdges;
 use crate::mesh::has_three_corners;
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{Error, TriangleMesh};
@@ -274,65 +274,14 @@ struct Seams {
     vertices: usize,
 }
 
-/// A side of a face, `low < high`.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    low: u32,
-    high: u32,
-    /// Number of the corner from which it starts, of all corners of all faces.
-    start: u32,
-    /// From `low` to `high`.
-    upwards: bool,
-}
-
-impl Side {
-    fn face(self) -> u32 {
-        self.start / 3
-    }
-}
-
 impl Seams {
-    /// Pairs the sides of the faces.
     fn find(mesh: &TriangleMesh) -> Result<Self, Error> {
-        let count = mesh.faces.len();
-        if count == 0 {
-            return Err(Error::NoFaces);
-        }
-        // Three corners for every face are counted in 32 bits below.
-        if u32::try_from(3 * count).is_err() {
-            return Err(Error::TooLarge {
-                elements: "faces",
-                count,
-            });
-        }
-        let corners = mesh.faces.as_flattened();
-        let side = |start: u32| {
-            let (from, to) = (corners[start as usize], corners[next(start) as usize]);
-            Side {
-                low: from.min(to),
-                high: from.max(to),
-                start,
-                upwards: from < to,
-            }
-        };
-        let mut sides: Vec<Side> = (0..corners.len() as u32).map(side).collect();
-        sides.par_sort_unstable();
-        check_edges(mesh, &sides)?;
-
-        let mut faces = DisjointSets::new(count);
-        let mut sheets = DisjointSets::new(3 * count);
-        for [a, b] in sides.as_chunks().0 {
-            faces.unite(a.face(), b.face());
-            // The start of one side is the end of the other.
-            sheets.unite(a.start, next(b.start));
-            sheets.unite(next(a.start), b.start);
-        }
-        let (component, components) = faces.numbered();
-        let (_, vertices) = sheets.numbered();
+        let surface = HalfEdges::new(mesh)?;
+        let (component, components) = surface.components();
         Ok(Self {
             component,
             components,
-            vertices,
+            vertices: surface.sheets(),
         })
     }
 
@@ -343,85 +292,5 @@ impl Seams {
             parts[part as usize].push(*face);
         }
         parts
-    }
-}
-
-/// Every edge must have one side in each direction.
-fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
-    let edges = || sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high));
-    // How many edges are wrong in some way, the first of them, and its ends.
-    let wrong = |is_wrong: &dyn Fn(&[Side]) -> bool| {
-        let mut wrong = edges().filter(|edge| is_wrong(edge));
-        let edge = wrong.next()?;
-        let [a, b] = [edge[0].low, edge[0].high].map(|v| mesh.vertices[v as usize]);
-        let (from, to) = if edge[0].upwards { (a, b) } else { (b, a) };
-        Some((1 + wrong.count(), edge, from, to))
-    };
-    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() > 2) {
-        return Err(Error::NonManifold {
-            edges,
-            face: edge[0].face() as usize,
-            others: edge.len() - 1,
-            from,
-            to,
-        });
-    }
-    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() == 1) {
-        return Err(Error::Open {
-            edges,
-            face: edge[0].face() as usize,
-            from,
-            to,
-        });
-    }
-    if let Some((edges, edge, from, to)) = wrong(&|edge| edge[0].upwards == edge[1].upwards) {
-        return Err(Error::MixedOrientation {
-            edges,
-            first: edge[0].face() as usize,
-            second: edge[1].face() as usize,
-            from,
-            to,
-        });
-    }
-    Ok(())
-}
-
-/// Union-find with path halving.
-struct DisjointSets(Vec<u32>);
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut element: u32) -> u32 {
-        let parent = &mut self.0;
-        while parent[element as usize] != element {
-            parent[element as usize] = parent[parent[element as usize] as usize];
-            element = parent[element as usize];
-        }
-        element
-    }
-
-    /// The smaller root becomes the root of both.
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-
-    /// The number of the set of every element, in the order of first elements, and of sets.
-    fn numbered(mut self) -> (Vec<u32>, usize) {
-        let (mut numbers, mut sets) = (Vec::with_capacity(self.0.len()), 0);
-        for element in 0..self.0.len() as u32 {
-            // The first element of a set is its root.
-            let root = self.root(element);
-            numbers.push(if root == element {
-                sets
-            } else {
-                numbers[root as usize]
-            });
-            sets += u32::from(root == element);
-        }
-        (numbers, sets as usize)
     }
 }

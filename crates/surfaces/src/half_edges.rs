@@ -1,6 +1,8 @@
 //! How the triangles of a closed surface hang together, and operations that keep its topology.
 
-use std::collections::HashMap;
+use rayon::prelude::*;
+
+use crate::{Error, TriangleMesh};
 
 /// What is no longer there.
 const NONE: u32 = u32::MAX;
@@ -29,27 +31,58 @@ pub(crate) fn previous(h: u32) -> u32 {
 }
 
 impl HalfEdges {
-    /// Of faces that run through every edge once in each direction, and once around every vertex; `None` if they do not pair.
-    pub(crate) fn new(vertices: usize, faces: &[[u32; 3]]) -> Option<Self> {
-        let origin = faces.as_flattened().to_vec();
-        let mut twin = vec![NONE; origin.len()];
-        let mut outgoing = vec![NONE; vertices];
-        let mut open = HashMap::with_capacity(origin.len() / 2);
-        for h in 0..u32::try_from(origin.len()).ok()? {
-            let (from, to) = (origin[h as usize], origin[next(h) as usize]);
-            outgoing[from as usize] = h;
-            if let Some(other) = open.remove(&(to, from)) {
-                twin[h as usize] = other;
-                twin[other as usize] = h;
-            } else if open.insert((from, to), h).is_some() {
-                return None;
-            }
+    /// Of faces that run through every edge once in each direction.
+    ///
+    /// # Errors
+    /// [`Error::NoFaces`], [`Error::TooLarge`]; [`Error::NonManifold`], [`Error::Open`] and [`Error::MixedOrientation`] for other edges.
+    pub(crate) fn new(mesh: &TriangleMesh) -> Result<Self, Error> {
+        let count = mesh.faces.len();
+        if count == 0 {
+            return Err(Error::NoFaces);
         }
-        open.is_empty().then_some(Self {
-            origin,
-            twin,
-            outgoing,
+        // Sides are counted in 32 bits.
+        if u32::try_from(3 * count).is_err() {
+            return Err(Error::TooLarge {
+                elements: "faces",
+                count,
+            });
+        }
+        let mut surface = Self {
+            origin: mesh.faces.as_flattened().to_vec(),
+            twin: vec![NONE; 3 * count],
+            outgoing: vec![NONE; mesh.vertices.len()],
+        };
+        let side = |start: u32| {
+            let (from, to) = (surface.from(start), surface.to(start));
+            Side {
+                low: from.min(to),
+                high: from.max(to),
+                start,
+                upwards: from < to,
+            }
+        };
+        let mut sides: Vec<Side> = (0..surface.len()).map(side).collect();
+        sides.par_sort_unstable();
+        check_edges(mesh, &sides)?;
+        for h in 0..surface.len() {
+            surface.start(h, surface.from(h));
+        }
+        for [a, b] in sides.as_chunks().0 {
+            surface.pair(a.start, b.start);
+        }
+        Ok(surface)
+    }
+
+    /// The number of the component of every face, in the order of first faces, and of components.
+    pub(crate) fn components(&self) -> (Vec<u32>, usize) {
+        numbered(self.len() / 3, |f| {
+            [0, 1, 2].map(|i| self.twin(3 * f + i) / 3)
         })
+    }
+
+    /// Number of vertices, counted once for every sheet.
+    pub(crate) fn sheets(&self) -> usize {
+        numbered(self.len(), |h| [next(self.twin(h))]).1
     }
 
     /// Half-edges ever, also of faces that are gone.
@@ -206,4 +239,79 @@ impl HalfEdges {
         }
         self.outgoing[b as usize] = NONE;
     }
+}
+
+/// A side of a face, `low < high`.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    low: u32,
+    high: u32,
+    /// Number of the corner from which it starts, of all corners of all faces.
+    start: u32,
+    /// From `low` to `high`.
+    upwards: bool,
+}
+
+impl Side {
+    fn face(self) -> u32 {
+        self.start / 3
+    }
+}
+
+/// Every edge must have one side in each direction.
+fn check_edges(mesh: &TriangleMesh, sides: &[Side]) -> Result<(), Error> {
+    let edges = || sides.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high));
+    // How many edges are wrong in some way, the first of them, and its ends.
+    let wrong = |is_wrong: &dyn Fn(&[Side]) -> bool| {
+        let mut wrong = edges().filter(|edge| is_wrong(edge));
+        let edge = wrong.next()?;
+        let [a, b] = [edge[0].low, edge[0].high].map(|v| mesh.vertices[v as usize]);
+        let (from, to) = if edge[0].upwards { (a, b) } else { (b, a) };
+        Some((1 + wrong.count(), edge, from, to))
+    };
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() > 2) {
+        return Err(Error::NonManifold {
+            edges,
+            face: edge[0].face() as usize,
+            others: edge.len() - 1,
+            from,
+            to,
+        });
+    }
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge.len() == 1) {
+        return Err(Error::Open {
+            edges,
+            face: edge[0].face() as usize,
+            from,
+            to,
+        });
+    }
+    if let Some((edges, edge, from, to)) = wrong(&|edge| edge[0].upwards == edge[1].upwards) {
+        return Err(Error::MixedOrientation {
+            edges,
+            first: edge[0].face() as usize,
+            second: edge[1].face() as usize,
+            from,
+            to,
+        });
+    }
+    Ok(())
+}
+
+/// The number of the set of every element, in the order of first elements, and of sets; an element is in one set with those beside it.
+fn numbered<const N: usize>(count: u32, beside: impl Fn(u32) -> [u32; N]) -> (Vec<u32>, usize) {
+    let (mut numbers, mut sets, mut open) = (vec![NONE; count as usize], 0, Vec::new());
+    for first in 0..count {
+        if numbers[first as usize] != NONE {
+            continue;
+        }
+        open.push(first);
+        while let Some(element) = open.pop() {
+            if std::mem::replace(&mut numbers[element as usize], sets) == NONE {
+                open.extend(beside(element));
+            }
+        }
+        sets += 1;
+    }
+    (numbers, sets as usize)
 }

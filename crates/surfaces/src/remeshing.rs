@@ -161,7 +161,7 @@ impl<'a> Remeshing<'a> {
         Some(Self {
             distance,
             spacing: distance.grid().spacing(),
-            surface: HalfEdges::new(mesh.vertices.len(), &mesh.faces)?,
+            surface: HalfEdges::new(mesh).ok()?,
             points: points.collect(),
         })
     }
