@@ -4,13 +4,12 @@ use std::any::Any;
 
 use fem::FiniteElementStep;
 use geometry::Stored;
-use model::Network;
 use operators::ComputeDevice;
-use solver::{Constraints, FlowState, MeanCurvatureFlow, StepRecord, WillmoreFlow};
+use solver::{Constraints, FlowState, StepRecord, WillmoreFlow};
 
 use crate::{Case, Error, Flow, Method, Order, Storage};
 
-/// The flow of a case, between two steps.
+/// The flow of a case, between two steps. What is behind it is compiled in this crate alone.
 pub(crate) trait Motion<const D: usize> {
     /// A time step of this size that ends with these sizes held, or one step of mean curvature flow, whose size is that of its operator. A step
     /// of second order is made only if `accept` takes it; the second value says so.
@@ -25,17 +24,17 @@ pub(crate) trait Motion<const D: usize> {
     /// The phase field, as it is stored.
     fn stored(&self) -> Result<Stored<D>, solver::Error>;
 
-    /// How many cells of the phase field are stored now, where that need not be all.
-    fn stored_cells(&self) -> Option<usize>;
+    /// How many cells of the phase field are stored now.
+    fn stored_cells(&self) -> usize;
 
-    /// All that the following steps depend on, after so many minimizations or steps and at this time.
-    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error>;
+    /// All that the following steps depend on.
+    fn state(&self) -> Result<FlowState<D>, solver::Error>;
 
     /// Goes to such a state.
     fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error>;
 }
 
-impl<const D: usize> Motion<D> for WillmoreFlow<D> {
+impl<const D: usize> Motion<D> for (Flow, WillmoreFlow<D>) {
     fn advance(
         &mut self,
         size: f64,
@@ -43,63 +42,33 @@ impl<const D: usize> Motion<D> for WillmoreFlow<D> {
         constraints: Constraints,
         accept: &mut dyn FnMut(&StepRecord) -> bool,
     ) -> Result<(Option<StepRecord>, bool), solver::Error> {
-        self.constrain(constraints)?;
+        let (kind, flow) = self;
+        if *kind == Flow::MeanCurvature {
+            flow.advance_by_mean_curvature()?;
+            return Ok((None, true));
+        }
+        flow.constrain(constraints)?;
         let (record, accepted) = match order {
-            Order::First => (WillmoreFlow::advance(self, size)?, true),
-            Order::Second | Order::Controlled(_) => self.advance_second_order(size, accept)?,
+            Order::First => (flow.advance(size)?, true),
+            Order::Second | Order::Controlled(_) => flow.advance_second_order(size, accept)?,
         };
         Ok((Some(record), accepted))
     }
 
     fn stored(&self) -> Result<Stored<D>, solver::Error> {
-        self.stored_field()
+        self.1.stored_field()
     }
 
-    fn stored_cells(&self) -> Option<usize> {
-        Some(WillmoreFlow::stored_cells(self))
+    fn stored_cells(&self) -> usize {
+        self.1.stored_cells()
     }
 
-    fn state(&self, _: usize, _: f64) -> Result<FlowState<D>, solver::Error> {
-        WillmoreFlow::state(self)
-    }
-
-    fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
-        WillmoreFlow::restore(self, state)
-    }
-}
-
-impl<const D: usize> Motion<D> for MeanCurvatureFlow<D> {
-    fn advance(
-        &mut self,
-        _: f64,
-        _: Order,
-        _: Constraints,
-        _: &mut dyn FnMut(&StepRecord) -> bool,
-    ) -> Result<(Option<StepRecord>, bool), solver::Error> {
-        MeanCurvatureFlow::advance(self)?;
-        Ok((None, true))
-    }
-
-    fn stored(&self) -> Result<Stored<D>, solver::Error> {
-        Ok(Stored::whole(self.field()?))
-    }
-
-    fn stored_cells(&self) -> Option<usize> {
-        None
-    }
-
-    fn state(&self, count: usize, time: f64) -> Result<FlowState<D>, solver::Error> {
-        // Nothing else is known of it.
-        Ok(FlowState {
-            current: self.field()?.into_values(),
-            step: count,
-            time,
-            ..FlowState::default()
-        })
+    fn state(&self) -> Result<FlowState<D>, solver::Error> {
+        self.1.state()
     }
 
     fn restore(&mut self, state: &FlowState<D>) -> Result<(), solver::Error> {
-        MeanCurvatureFlow::restore(self, state)
+        self.1.restore(state)
     }
 }
 
@@ -138,7 +107,7 @@ pub(crate) fn of<const D: usize>(
     let made = make.expect("a case is in the plane or in space")(case, state, device)?;
     if !whole {
         // How many cells are stored is known only now; little is allocated yet.
-        let stored = made.0.stored_cells().unwrap_or(grid.len());
+        let stored = made.0.stored_cells();
         Storage::check(kind, case.flow, grid, stored, true)?;
     }
     Ok(made)
@@ -154,46 +123,31 @@ fn make<const D: usize>(
         Some(_) => None,
         None => Some(operator.elements(case.grid(), &case.scales)?),
     };
-    let mut motion: Box<dyn Motion<D>> = match case.flow {
-        Flow::Willmore => {
-            let mut flow = match elements.clone() {
-                Some(step) => WillmoreFlow::new(step, &case.initial.field()?, params, device)?,
-                None => learned(case, device)?,
-            };
-            if !case.energy.is_willmore() {
-                flow.set_energy(case.energy, operator.response)?;
-            }
-            if let Some(region) = &case.region {
-                flow.restrict_to(region)?;
-            }
-            // What no shape has is refused before the first step: the targets, and sizes on the way to them.
-            flow.constrain(case.held.targets())?;
-            case.held.check(case.grid())?;
-            for step in 1..=case.held.steps() {
-                flow.constrain(case.held.at(step as f64))?;
-            }
-            Box::new(flow)
-        }
-        Flow::MeanCurvature => {
-            let from = case.initial.field()?;
-            Box::new(match elements.clone() {
-                Some(step) => MeanCurvatureFlow::new(step, &from, device)?,
-                None => MeanCurvatureFlow::with_network(network(case), &from, &params, device)?,
-            })
-        }
+    let mut flow = match elements.clone() {
+        Some(step) => WillmoreFlow::new(step, &case.initial.field()?, params, device)?,
+        None => learned(case, device)?,
     };
-    if let Some(state) = state {
-        motion.restore(state)?;
+    if case.flow == Flow::Willmore {
+        if !case.energy.is_willmore() {
+            flow.set_energy(case.energy, operator.response)?;
+        }
+        if let Some(region) = &case.region {
+            flow.restrict_to(region)?;
+        }
+        // What no shape has is refused before the first step: the targets, and sizes on the way to them.
+        flow.constrain(case.held.targets())?;
+        case.held.check(case.grid())?;
+        for step in 1..=case.held.steps() {
+            flow.constrain(case.held.at(step as f64))?;
+        }
     }
-    Ok((motion, elements))
+    if let Some(state) = state {
+        flow.restore(state)?;
+    }
+    Ok((Box::new((case.flow, flow)), elements))
 }
 
-fn network<const D: usize>(case: &Case<D>) -> &Network {
-    let named = case.operator.network();
-    &named.expect("a learned operator has a network").network
-}
-
-/// Willmore flow with a network, of what is to be stored.
+/// The flow with a network, of what is to be stored.
 fn learned<const D: usize>(
     case: &Case<D>,
     device: &ComputeDevice,
@@ -201,7 +155,9 @@ fn learned<const D: usize>(
     use solver::Error::{Geometry, Model, NoInterface};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
-    let (network, initial, params) = (network(case), &case.initial, case.params());
+    let named = case.operator.network();
+    let network = &named.expect("a learned operator has a network").network;
+    let (initial, params) = (&case.initial, case.params());
     let dense = || WillmoreFlow::with_network(network, &initial.field()?, params, device);
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     // Where bricks are no alternative.
@@ -210,6 +166,9 @@ fn learned<const D: usize>(
         Storage::check(device.kind(), case.flow, grid, grid.len(), false)?;
         Ok(dense()?)
     };
+    if case.flow == Flow::MeanCurvature {
+        return Ok(dense()?);
+    }
     let mut flow = match case.operator.storage {
         Storage::Dense => dense()?,
         Storage::Bricks => bricks()?,

@@ -136,7 +136,7 @@ impl<const D: usize> Run<D> {
         let (order, longest) = (self.case.steps.order, self.case.steps.longest_move);
         // Where it is before the step, for trying that again.
         let before = match longest {
-            Some(longest) => Some((longest, self.state()?, self.motion.stored()?)),
+            Some(longest) => Some((longest, self.state()?)),
             None => None,
         };
         // What was too long for the last step is not tried again at once.
@@ -162,11 +162,11 @@ impl<const D: usize> Run<D> {
                     self.torn = true;
                     // How far it has gone over how far it may go.
                     let part = match &before {
-                        Some((longest, _, before)) => self.has_gone(before)? / longest,
+                        Some((longest, before)) => self.has_gone(&before.current)? / longest,
                         None => 0.0,
                     };
                     let too_far = part > 1.0 && halvings < halvings_of_motion;
-                    let Some((_, state, _)) = before.as_ref().filter(|_| too_far) else {
+                    let Some((_, state)) = before.as_ref().filter(|_| too_far) else {
                         let mcf_step = self.case.scales.mcf_step;
                         let count = self.records.len() + 1;
                         return Ok(Record {
@@ -302,8 +302,7 @@ impl<const D: usize> Run<D> {
 
     /// How many cells of the phase field are stored now: all of the grid, or those of the bricks near the surface.
     pub fn stored_cells(&self) -> usize {
-        let stored = self.motion.stored_cells();
-        stored.unwrap_or_else(|| self.case.grid().len())
+        self.motion.stored_cells()
     }
 
     /// Work of the linear solves inside finite elements so far; none for a learned operator.
@@ -312,7 +311,7 @@ impl<const D: usize> Run<D> {
     }
 
     pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
-        Ok(self.motion.state(self.records.len(), self.time())?)
+        Ok(self.motion.state()?)
     }
 }
 

@@ -179,10 +179,7 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Stored<D>, Option<
         NodeSet::from_ranges(grid.len(), ranges)
             .ok_or_else(|| unreadable(stored, "its region is none of its grid"))
     });
-    let bricks = bricks(stored, "initial_bricks", &grid)?;
-    let nodes = bricks.map_or_else(|| grid.into(), |bricks| Nodes::on_bricks(grid, bricks));
-    let initial = Stored::from_values(nodes, values(stored, "initial")?);
-    let initial = initial.map_err(|error| unreadable(stored, error))?;
+    let initial = phase_field(stored, "initial", &nodes(stored, "initial_bricks", grid)?)?;
     Ok((initial, region.transpose()?))
 }
 
@@ -200,6 +197,8 @@ pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
 fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>, Error> {
     let state = run.state()?;
     let (previous, previous_tau) = state.previous.unzip();
+    let marks = |u: &Stored<D>| u.nodes().bricks().map(|bricks| bricks.marks());
+    let bricks = marks(&state.current);
     let notes = json!({
         "case": run.identity(),
         "application": notes,
@@ -212,13 +211,12 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
     let initial = &run.case.initial;
     let mut packed = State::new(run.records.len() as u64, notes)
         .with_array("initial", initial.values())
-        .with_array("current", state.current);
-    let marks = |bricks: &Arc<Bricks<D>>| bricks.marks();
+        .with_array("current", state.current.into_values());
     let optional = [
-        ("initial_bricks", initial.nodes().bricks().map(marks)),
-        ("bricks", state.bricks.as_ref().map(marks)),
-        ("previous", previous),
-        ("rate", state.rate),
+        ("initial_bricks", marks(initial)),
+        ("bricks", bricks),
+        ("previous", previous.map(Stored::into_values)),
+        ("rate", state.rate.map(Stored::into_values)),
     ];
     for (name, values) in optional {
         if let Some(values) = values {
@@ -253,18 +251,26 @@ fn restore<const D: usize>(
     }
     check_identity(stored, &wanted)?;
     let grid = *case.grid();
-    let optional = |name: &str| state.array(name).map(<[f64]>::to_vec);
+    let nodes = nodes(stored, "bricks", grid)?;
+    let optional = |name: &str| {
+        let is_there = state.array(name).is_some();
+        is_there
+            .then(|| phase_field(stored, name, &nodes))
+            .transpose()
+    };
     let previous_tau: Option<f64> = read(stored, &state.notes["previous_tau"])?;
+    // Where nothing is stored nothing moves.
+    let rate =
+        optional("rate")?.map(|rate| Stored::new(rate.into_values(), nodes.clone(), [0.0; 2]));
     let (mut half_motions, mut half) = (Vec::new(), grid);
-    while let Some(motion) = optional(&half_motion(half_motions.len())) {
+    while let Some(motion) = state.array(&half_motion(half_motions.len())) {
         half = half.half()?;
-        half_motions.push(Field::from_values(half, motion)?);
+        half_motions.push(Field::from_values(half, motion.to_vec())?);
     }
     let at = FlowState {
-        bricks: bricks(stored, "bricks", &grid)?,
-        current: values(stored, "current")?,
-        previous: optional("previous").zip(previous_tau),
-        rate: optional("rate"),
+        current: phase_field(stored, "current", &nodes)?,
+        previous: optional("previous")?.zip(previous_tau),
+        rate,
         half_motions,
         step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &state.notes["time"])?,
@@ -298,21 +304,24 @@ fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
     Ok(Grid::new(cells, side)?.with_origin(origin)?)
 }
 
-fn bricks<const D: usize>(
-    stored: &StoredRun,
-    name: &str,
-    grid: &Grid<D>,
-) -> Result<Option<Arc<Bricks<D>>>, Error> {
-    let bricks = |marks| {
-        let bricks = Bricks::with_marks(grid.cells(), marks);
-        Ok(Arc::new(bricks.map_err(|error| unreadable(stored, error))?))
+/// Where the values of phase fields lie, by the name of the marks of their bricks.
+fn nodes<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Nodes<D>, Error> {
+    let Some(marks) = stored.state().array(name) else {
+        return Ok(grid.into());
     };
-    stored.state().array(name).map(bricks).transpose()
+    let bricks = Bricks::with_marks(grid.cells(), marks);
+    let bricks = bricks.map_err(|error| unreadable(stored, error))?;
+    Ok(Nodes::on_bricks(grid, Arc::new(bricks)))
 }
 
-fn values(stored: &StoredRun, name: &str) -> Result<Vec<f64>, Error> {
-    let values = stored.state().array(name).map(<[f64]>::to_vec);
-    values.ok_or_else(|| unreadable(stored, format!("it has no {name:?}")))
+fn phase_field<const D: usize>(
+    stored: &StoredRun,
+    name: &str,
+    nodes: &Nodes<D>,
+) -> Result<Stored<D>, Error> {
+    let values = stored.state().array(name).unwrap_or_default().to_vec();
+    let field = Stored::from_values(nodes.clone(), values);
+    field.map_err(|error| unreadable(stored, format!("its array {name}: {error}")))
 }
 
 pub(crate) fn read<T: DeserializeOwned>(stored: &StoredRun, value: &Value) -> Result<T, Error> {

@@ -13,8 +13,7 @@ use linearize::taylor::{halvings, remainder};
 use operators::ComputeDevice;
 use rand::{RngExt, SeedableRng};
 use solver::{
-    Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, MinimizingMovement, Objective,
-    WillmoreFlow,
+    Error, Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, Objective, WillmoreFlow,
 };
 
 const STIFFNESS: f64 = 40.0;
@@ -219,9 +218,9 @@ fn a_ball_stays_put_and_discs_shrink() {
             "{} h, {record:?}",
             moved / grid.spacing()
         );
-        let mut flow = MeanCurvatureFlow::new(step, &start, &device).unwrap();
+        let mut flow = WillmoreFlow::new(step, &start, params, &device).unwrap();
         for _ in 0..4 {
-            flow.advance().unwrap();
+            flow.advance_by_mean_curvature().unwrap();
         }
         let expected = exact::mean_curvature_radius(0.3, 4.0 * size, 3);
         let found = radius(&flow.field().unwrap());
@@ -240,12 +239,12 @@ fn a_failing_inner_solver_stops_the_flow_with_its_numbers() {
     let step = FiniteElementStep::implicit(&grid, eps, size).unwrap();
     // The cubes of these values overflow.
     let start = ball(grid, 0.3, eps).map(|u| 1e150 * u);
-    let mut flow = MeanCurvatureFlow::new(step.clone(), &start, &device).unwrap();
-    let error = flow.advance().unwrap_err();
+    let params = FlowParams::paper(eps, size);
+    let mut flow = WillmoreFlow::new(step.clone(), &start, params, &device).unwrap();
+    let error = flow.advance_by_mean_curvature().unwrap_err();
     assert!(matches!(error, Error::Step(_)), "{error}");
     assert!(error.to_string().contains("Newton's method"), "{error}");
     assert_eq!(flow.field().unwrap(), start, "the flow is where it was");
-    let params = FlowParams::paper(eps, size);
     let mut flow = WillmoreFlow::new(step, &start, params, &device).unwrap();
     let error = flow.advance(size).unwrap_err();
     assert!(matches!(error, Error::NonFinite { step: 1, .. }), "{error}");

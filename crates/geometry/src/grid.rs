@@ -157,8 +157,11 @@ impl<const D: usize> Grid<D> {
         (axis + 1..D).map(|_| self.cells).product()
     }
 
-    /// The error for an operation on fields of two grids, if they differ.
-    pub(crate) fn same_as(&self, other: &Self) -> Result<(), Error> {
+    /// Refuses an operation on fields of two grids.
+    ///
+    /// # Errors
+    /// [`Error::GridMismatch`] if they differ.
+    pub fn same_as(&self, other: &Self) -> Result<(), Error> {
         if self == other {
             return Ok(());
         }

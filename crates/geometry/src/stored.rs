@@ -14,7 +14,7 @@ const SIDE: usize = 8;
 const PHASES: [f64; 2] = [-1.0, 1.0];
 
 /// The values of a field on the whole grid, or on bricks, with the constants that it has outside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Stored<const D: usize> {
     nodes: Nodes<D>,
     values: Vec<f64>,

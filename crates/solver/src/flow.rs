@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Field, Grid, NodeSet, PhaseField, Stored};
+use geometry::{Field, Grid, NodeSet, PhaseField, Stored};
 use model::{MeanCurvatureOperator, Network, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
@@ -14,6 +14,7 @@ use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, minimize_timed};
 use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
+use crate::stored::tensor;
 use crate::times::PhaseTimes;
 use crate::{
     Accuracy, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep,
@@ -86,16 +87,14 @@ impl StepRecord {
 }
 
 /// Where a flow is, for resuming it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FlowState<const D: usize> {
-    /// The bricks on which the values are, if not on the whole grid.
-    pub bricks: Option<Arc<Bricks<D>>>,
     /// The phase field.
-    pub current: Vec<f64>,
+    pub current: Stored<D>,
     /// The phase field one step ago and the size of that step: what the next step extrapolates.
-    pub previous: Option<(Vec<f64>, f64)>,
+    pub previous: Option<(Stored<D>, f64)>,
     /// The rate of displacement at the end of the last step, in `atanh u` per time: what second-order steps continue.
-    pub rate: Option<Vec<f64>>,
+    pub rate: Option<Stored<D>>,
     /// The last motions on the coarser grids on which steps [begin](WillmoreFlow::begin_on), the finest first.
     pub half_motions: Vec<Field<D>>,
     /// Steps done.
@@ -104,7 +103,7 @@ pub struct FlowState<const D: usize> {
     pub time: f64,
 }
 
-/// Willmore flow of a phase field by minimizing movements (def:minProblem).
+/// Willmore flow of a phase field by minimizing movements, with a step of mean curvature flow inside, which can be made alone, too.
 pub struct WillmoreFlow<const D: usize> {
     grid: Grid<D>,
     params: FlowParams,
@@ -112,11 +111,10 @@ pub struct WillmoreFlow<const D: usize> {
     /// The bricks that are stored, if not the whole grid.
     active: Option<Active<D>>,
     mcf: Arc<dyn MeanCurvatureStep<D>>,
-    energy: MinimizingMovement<D>,
+    /// The energy, and the same with weights of the motion, each traced when it is first minimized.
+    energies: [Option<MinimizingMovement<D>>; 2],
     /// What it has besides bending.
     terms: Option<HelfrichTerms<D>>,
-    /// The same with weights of the motion, from the first second-order step on.
-    weighted: Option<MinimizingMovement<D>>,
     phase: Option<(f64, PhaseInverse<D>)>,
     region: Option<Region<D>>,
     constraints: Constraints,
@@ -143,14 +141,17 @@ impl<const D: usize> WillmoreFlow<D> {
         params: FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let operator = fitting_operator(network, initial.grid(), &params, device)?;
+        let grid = initial.grid();
+        network.check_fits(params.ratios(grid, network.ratios().width))?;
+        let operator = MeanCurvatureOperator::new(network, device)?;
+        operator.check_grid(grid.cells())?;
         Self::new(operator, initial, params, device)
     }
 
     /// A flow whose curvature comes from any step of mean curvature flow of size `params.mcf_step`.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for parameters, [`Error::NonFinite`], or what tracing the energy raises.
+    /// [`Error::Geometry`] for parameters, [`Error::NonFinite`].
     pub fn new(
         step: impl MeanCurvatureStep<D> + 'static,
         initial: &Field<D>,
@@ -158,14 +159,13 @@ impl<const D: usize> WillmoreFlow<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.validate()?;
-        let current = upload(initial, device)?;
-        Self::begun(
-            Arc::new(step),
-            None,
-            (initial.grid(), current),
-            params,
-            device,
-        )
+        initial
+            .check_finite()
+            .map_err(|_| Error::non_finite(0, "phase field"))?;
+        let grid = initial.grid();
+        let current = device.tensor(initial.values(), grid.shape());
+        let step = Arc::new(step);
+        Ok(Self::begun(step, None, (grid, current), params, device))
     }
 
     /// A flow with a learned operator on active bricks, which follow the interface: bricks that are further from it than 8 `eps` are not stored,
@@ -193,7 +193,8 @@ impl<const D: usize> WillmoreFlow<D> {
         let bricks = &active.bricks;
         let current = device.tensor(&initial.values_on(bricks), bricks.shape());
         let step = Arc::new(active.step(device));
-        Self::begun(step, Some(active), (grid, current), params, device)
+        let (active, start) = (Some(active), (grid, current));
+        Ok(Self::begun(step, active, start, params, device))
     }
 
     fn begun(
@@ -202,19 +203,15 @@ impl<const D: usize> WillmoreFlow<D> {
         (grid, current): (&Grid<D>, Tensor<D>),
         params: FlowParams,
         device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        let (shape, precision) = (current.dims(), params.newton.precision);
-        let energy =
-            MinimizingMovement::with_terms(mcf.clone(), shape, precision, (false, None), device)?;
-        Ok(Self {
+    ) -> Self {
+        Self {
             grid: *grid,
             params,
             device: device.clone(),
             active,
             mcf,
-            energy,
+            energies: [None, None],
             terms: None,
-            weighted: None,
             phase: None,
             region: None,
             constraints: Constraints::default(),
@@ -225,7 +222,7 @@ impl<const D: usize> WillmoreFlow<D> {
             rate: None,
             step: 0,
             time: 0.0,
-        })
+        }
     }
 
     /// Lets only the values at these nodes move from now on; the others stay, bit for bit where they are stored.
@@ -253,7 +250,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for values that are not finite, or what tracing the energy raises.
+    /// [`Error::Geometry`] for values that are not finite.
     pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
         self.terms = if energy.is_willmore() {
             None
@@ -265,8 +262,7 @@ impl<const D: usize> WillmoreFlow<D> {
                 None => terms,
             })
         };
-        self.energy = self.traced(false)?;
-        self.weighted = None;
+        self.energies = [None, None];
         match &mut self.half {
             Some(half) => half.set_energy(energy, response),
             None => Ok(()),
@@ -299,22 +295,26 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// The phase field now, as it is stored.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
     pub fn stored_field(&self) -> Result<Stored<D>, Error> {
-        self.stored(&self.current)
+        let now = self.stored(&self.current)?;
+        now.check_finite()
+            .map_err(|_| Error::non_finite(self.step, "phase field"))?;
+        Ok(now)
     }
 
     /// Everything the following steps depend on: a flow [restored](Self::restore) from it continues with the same bytes.
     pub fn state(&self) -> Result<FlowState<D>, Error> {
-        let values = |u: &Tensor<D>| self.device.values(u.clone());
         let previous = match &self.previous {
-            Some((u, tau)) => Some((values(u)?, *tau)),
+            Some((u, tau)) => Some((self.stored(u)?, *tau)),
             None => None,
         };
         Ok(FlowState {
-            bricks: self.active.as_ref().map(|active| active.bricks.clone()),
-            current: values(&self.current)?,
+            current: self.stored(&self.current)?,
             previous,
-            rate: self.rate.clone().map(Stored::into_values),
+            rate: self.rate.clone(),
             half_motions: self.half_motions(),
             step: self.step,
             time: self.time,
@@ -324,7 +324,7 @@ impl<const D: usize> WillmoreFlow<D> {
     /// Goes to a state of a flow with the same grid and parameters.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for fields on another grid or on other bricks, [`Error::NonFinite`] for values that are not finite.
+    /// [`Error::Geometry`] for fields on another grid or on bricks of another size, [`Error::NonFinite`] for values that are not finite.
     pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
         let previous = state.previous.as_ref();
         let fields = [
@@ -332,58 +332,31 @@ impl<const D: usize> WillmoreFlow<D> {
             previous.map(|(u, _)| u),
             state.rate.as_ref(),
         ];
-        for values in fields.into_iter().flatten() {
-            self.check_state(state, values)?;
+        for field in fields.into_iter().flatten() {
+            self.grid.same_as(field.grid())?;
+            field
+                .check_finite()
+                .map_err(|_| Error::non_finite(state.step, "phase field"))?;
         }
         self.set_half_motions(&state.half_motions)?;
         if let Some(active) = &self.active {
-            let next = match &state.bricks {
-                Some(bricks) => active.at(bricks.clone()),
-                None => {
-                    let current = state.current.clone();
-                    active.following_field(&Field::from_values(self.grid, current)?)?
+            let next = match state.current.nodes().bricks() {
+                Some(bricks) if bricks.side() != active.bricks.side() => {
+                    let [cells, side] = [bricks.cells(), bricks.side()];
+                    return Err(geometry::Error::Bricks { cells, side }.into());
                 }
+                Some(bricks) => active.at(bricks.clone()),
+                None => active.following_field(&state.current)?,
             };
             self.go_to(next)?;
         }
-        // Values on the whole grid, as of a flow that has not been on bricks yet.
-        let whole = self.active.as_ref().filter(|_| state.bricks.is_none());
-        let stored = |values: &Vec<f64>| match whole {
-            Some(active) => active.bricks.gather(values),
-            None => values.clone(),
-        };
-        let dims = self.current.dims();
-        let tensor = |values: &Vec<f64>| self.device.tensor(&stored(values), dims);
-        let rate =
-            (state.rate.as_ref()).map(|rate| Stored::new(stored(rate), self.nodes(), [0.0; 2]));
-        let current = tensor(&state.current);
-        self.previous = previous.map(|(u, tau)| (tensor(u), *tau));
-        self.current = current;
-        self.rate = rate;
+        let nodes = self.nodes();
+        let on_device = |u: &Stored<D>| tensor(&u.on(&nodes), &self.device);
+        self.current = on_device(&state.current);
+        self.previous = previous.map(|(u, tau)| (on_device(u), *tau));
+        self.rate = state.rate.as_ref().map(|rate| rate.on(&nodes));
         self.step = state.step;
         self.time = state.time;
-        Ok(())
-    }
-
-    /// Refuses values of a state that this flow cannot go to.
-    fn check_state(&self, state: &FlowState<D>, values: &[f64]) -> Result<(), Error> {
-        let expected = match (&self.active, &state.bricks) {
-            (Some(active), Some(bricks)) => {
-                let [cells, side] = [bricks.cells(), bricks.side()];
-                if [cells, side] != [self.grid.cells(), active.bricks.side()] {
-                    return Err(geometry::Error::Bricks { cells, side }.into());
-                }
-                bricks.len()
-            }
-            _ => self.grid.len(),
-        };
-        if values.len() != expected {
-            let actual = values.len();
-            return Err(geometry::Error::ValueCount { expected, actual }.into());
-        }
-        if !values.iter().all(|value| value.is_finite()) {
-            return Err(Error::non_finite(state.step, "phase field"));
-        }
         Ok(())
     }
 
@@ -419,6 +392,22 @@ impl<const D: usize> WillmoreFlow<D> {
             self.set_half_motions(&half_motions)?;
         }
         made
+    }
+
+    /// One step `u <- v[u]` of the mean curvature flow inside, of its own size. A value that is not finite is reported by the next
+    /// [`Self::stored_field`].
+    ///
+    /// # Errors
+    /// [`Error::Step`] if the step's own solver fails; the flow stays where it was.
+    pub fn advance_by_mean_curvature(&mut self) -> Result<(), Error> {
+        let next = self.mcf.apply(self.current.clone());
+        if let Some(failure) = self.mcf.failure() {
+            return Err(Error::Step(failure));
+        }
+        self.current = next;
+        self.step += 1;
+        self.time = self.step as f64 * self.params.mcf_step;
+        Ok(())
     }
 
     fn make_step(&mut self, tau: f64) -> Result<StepRecord, Error> {
@@ -490,9 +479,11 @@ impl<const D: usize> WillmoreFlow<D> {
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);
         self.prepare(stiffness);
-        if factors.is_some() && self.weighted.is_none() {
-            self.weighted = Some(self.traced(true)?);
-        }
+        let weighted = usize::from(factors.is_some());
+        let energy = match self.energies[weighted].take() {
+            Some(energy) => energy,
+            None => self.traced(factors.is_some())?,
+        };
         let preconditioner = self.phase.as_ref().map(|(_, phase)| Preconditioner {
             phase: phase.clone(),
             nodes: self.nodes(),
@@ -502,13 +493,10 @@ impl<const D: usize> WillmoreFlow<D> {
             interface: None,
         });
         let (params, device, current) = (self.params.newton, &self.device, &self.current);
-        let energy = match (factors, &mut self.weighted) {
-            (Some(factors), Some(energy)) => {
-                energy.set_factors(factors);
-                energy
-            }
-            _ => &mut self.energy,
-        };
+        let energy = self.energies[weighted].insert(energy);
+        if let Some(factors) = factors {
+            energy.set_factors(factors);
+        }
         energy.set(anchor, stiffness)?;
         let (stored, eps) = ((self.grid, self.active.as_ref()), self.params.eps);
         let mut held = Held::new(&constraints, stored, eps, self.region.as_ref(), device);
@@ -587,101 +575,6 @@ struct Minimum<const D: usize> {
     pressure: Option<f64>,
     newton: NewtonInfo,
     times: PhaseTimes,
-}
-
-/// Mean curvature flow by repeated application of a step: the learned operator or another.
-pub struct MeanCurvatureFlow<const D: usize> {
-    grid: Grid<D>,
-    mcf: Arc<dyn MeanCurvatureStep<D>>,
-    device: ComputeDevice,
-    current: Tensor<D>,
-    step: usize,
-}
-
-impl<const D: usize> MeanCurvatureFlow<D> {
-    /// A flow with a learned operator, whose ratios must be those of the grid.
-    pub fn with_network(
-        network: &Network,
-        initial: &Field<D>,
-        params: &FlowParams,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        let operator = fitting_operator(network, initial.grid(), params, device)?;
-        Self::new(operator, initial, device)
-    }
-
-    /// A flow by any step.
-    ///
-    /// # Errors
-    /// [`Error::NonFinite`] if the initial field is not finite.
-    pub fn new(
-        step: impl MeanCurvatureStep<D> + 'static,
-        initial: &Field<D>,
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
-        Ok(Self {
-            grid: *initial.grid(),
-            mcf: Arc::new(step),
-            device: device.clone(),
-            current: upload(initial, device)?,
-            step: 0,
-        })
-    }
-
-    /// One step `u <- v[u]`. A value that is not finite is reported by the next [`Self::field`].
-    ///
-    /// # Errors
-    /// [`Error::Step`] if the step's own solver fails; the flow stays where it was.
-    pub fn advance(&mut self) -> Result<(), Error> {
-        let next = self.mcf.apply(self.current.clone());
-        if let Some(failure) = self.mcf.failure() {
-            return Err(Error::Step(failure));
-        }
-        self.current = next;
-        self.step += 1;
-        Ok(())
-    }
-
-    /// The phase field now.
-    ///
-    /// # Errors
-    /// [`Error::NonFinite`] naming the step, [`Error::Operators`] if the device fails.
-    pub fn field(&self) -> Result<Field<D>, Error> {
-        download(&self.grid, &self.current, &self.device).map_err(|error| match error {
-            Error::Geometry(_) => Error::non_finite(self.step, "phase field"),
-            error => error,
-        })
-    }
-
-    /// Goes to a state of a flow with the same grid.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] for another number of values, or values that are not finite.
-    pub fn restore(&mut self, state: &FlowState<D>) -> Result<(), Error> {
-        let field = Field::from_values(self.grid, state.current.clone())?;
-        self.current = upload(&field, &self.device)?;
-        self.step = state.step;
-        Ok(())
-    }
-}
-
-fn fitting_operator<const D: usize>(
-    network: &Network,
-    grid: &Grid<D>,
-    params: &FlowParams,
-    device: &ComputeDevice,
-) -> Result<MeanCurvatureOperator<D>, Error> {
-    network.check_fits(params.ratios(grid, network.ratios().width))?;
-    let operator = MeanCurvatureOperator::new(network, device)?;
-    operator.check_grid(grid.cells())?;
-    Ok(operator)
-}
-
-fn upload<const D: usize>(field: &Field<D>, device: &ComputeDevice) -> Result<Tensor<D>, Error> {
-    field
-        .check_finite()
-        .map_err(|_| Error::non_finite(0, "phase field"))?;
-    Ok(device.tensor(field.values(), field.grid().shape()))
 }
 
 fn download<const D: usize>(

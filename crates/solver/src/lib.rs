@@ -64,9 +64,7 @@ pub use constraints::Constraints;
 pub use displacement::widths_between;
 pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
 pub use error::{Error, StepFailure};
-pub use flow::{
-    FlowState, MeanCurvatureFlow, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow,
-};
+pub use flow::{FlowState, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow};
 pub use helfrich::{Helfrich, HelfrichTerms};
 pub use model::Factors;
 pub use newton::{Exit, NewtonInfo, minimize};

@@ -7,9 +7,8 @@ use geometry::{Field, Grid, exact};
 use model::MeanCurvatureOperator;
 use operators::{SpectralFilter, spectral_filter};
 use solver::{
-    Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, Method, MinimizingMovement,
-    NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, WillmoreFlow,
-    minimize,
+    Error, Exit, FlowParams, MeanCurvatureStep, Method, MinimizingMovement, NewtonParams,
+    Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, WillmoreFlow, minimize,
 };
 use std::sync::Arc;
 
@@ -230,7 +229,7 @@ fn a_restored_flow_continues_with_the_same_bytes() {
     assert_eq!(restored.field().unwrap(), whole.field().unwrap());
     let other = Grid::<2>::per_unit(128, 0.5).unwrap();
     let mut foreign = state;
-    foreign.current = ball(other, RADIUS).into_values();
+    foreign.current = ball(other, RADIUS).into();
     assert!(restored.restore(&foreign).is_err());
 }
 
@@ -258,9 +257,9 @@ fn a_ball_stays_put() {
 fn mean_curvature_flow_shrinks_a_disc() {
     let params = params(&grid());
     let start = ball(grid(), RADIUS);
-    let mut flow = MeanCurvatureFlow::with_network(&network(), &start, &params, &device()).unwrap();
+    let mut flow = WillmoreFlow::with_network(&network(), &start, params, &device()).unwrap();
     for _ in 0..8 {
-        flow.advance().unwrap();
+        flow.advance_by_mean_curvature().unwrap();
     }
     let radius = exact::mean_curvature_radius(RADIUS, 8.0 * TAU, 2);
     let error = l2_distance(&flow.field().unwrap(), &ball(grid(), radius)).unwrap();

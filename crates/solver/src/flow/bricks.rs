@@ -83,8 +83,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.active = Some(next);
         // What it was prepared for belongs to the step of mean curvature flow.
         self.phase = None;
-        self.weighted = None;
-        self.energy = self.traced(false)?;
+        self.energies = [None, None];
         Ok(())
     }
 
