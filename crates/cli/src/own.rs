@@ -6,7 +6,7 @@ use engine::DISPLACEMENT;
 use surfaces::{Followed, Warning};
 
 use crate::faired::{Faired, figure, report, surface};
-use crate::keep::{Keep, key};
+use crate::keep;
 use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::Known;
@@ -41,7 +41,8 @@ struct Loaded {
     mesh: TriangleMesh,
     /// The file of the mask, if that is a mesh.
     mask: Option<Vec<u8>>,
-    keep: Option<Keep>,
+    /// The distance of what stays.
+    keep: Option<Box<dyn SignedDistance<3>>>,
     fairing: Fairing,
 }
 
@@ -75,7 +76,7 @@ impl OwnMesh {
 
     /// The path of the mask, if that is a mesh, and the name of its copy.
     fn mask(&self) -> Option<(&Path, String)> {
-        let path = Keep::mask(self.keep.as_deref()?)?;
+        let path = keep::mask(self.keep.as_deref()?)?;
         Some((path, format!("keep.{}", extension(path))))
     }
 
@@ -87,9 +88,9 @@ impl OwnMesh {
             self.noise = closed.mesh().noise();
         }
         let keep = self.keep.as_deref();
-        let keep = keep.map(|text| Keep::parse(text, mask.as_deref(), &mesh, (&bytes, &self.file)));
+        let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, (&bytes, &self.file)));
         let keep = keep.transpose()?;
-        let stays = |x| keep.as_ref().is_some_and(|keep| keep.holds(x));
+        let stays = |x| matches!(&keep, Some(keep) if keep.signed_distance(x) <= 0.0);
         let fairing = Fairing::new(closed, self.noise, stays);
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
@@ -160,7 +161,7 @@ impl OwnMesh {
     /// The nodes that may move, if not all.
     pub fn nodes(&self, grid: &Grid<3>) -> Option<NodeSet> {
         let keep = self.loaded().keep.as_ref()?;
-        Some(keep.moving_nodes(grid, &self.rough().mesh().vertices))
+        Some(NodeSet::inside(grid, &|x| -keep.signed_distance(x)))
     }
 
     /// The grid has the coordinates of the mesh.
@@ -249,4 +250,9 @@ impl OwnMesh {
 /// Parts and gaps that are thinner than two cells come and go with the place of the grid.
 pub fn thinnest(grid: &Grid<3>) -> f64 {
     2.0 * grid.spacing()
+}
+
+/// The coordinates as bits, by which equal positions are found; -0 is 0.
+fn key(x: [f64; 3]) -> [u64; 3] {
+    x.map(|v| (v + 0.0).to_bits())
 }

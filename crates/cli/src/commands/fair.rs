@@ -2,7 +2,7 @@ use std::f64::consts::PI;
 
 use crate::cli::{FairOptions, MessageOptions};
 use crate::input::{Loaded, Source, closed};
-use crate::keep::Keep;
+use crate::keep;
 use crate::own::OwnMesh;
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -93,7 +93,7 @@ impl FairOptions {
                 "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
             );
         }
-        if let Some(mask) = self.keep.as_deref().and_then(Keep::mask) {
+        if let Some(mask) = self.keep.as_deref().and_then(keep::mask) {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = if repairs {
