@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use fem::FiniteElementStep;
 use files::{Sha256, hexadecimal};
-use geometry::{Field, Grid, NodeSet, Stored};
+use geometry::{Field, Grid, NodeSet, PhaseField, Stored};
 use operators::ComputeDevice;
 use serde_json::{Value, json};
 use solver::FlowParams;

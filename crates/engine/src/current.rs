@@ -19,23 +19,10 @@ pub struct Current<'a, const D: usize> {
 impl<'a, const D: usize> Current<'a, D> {
     /// It on the whole grid.
     pub(crate) fn field(&self) -> &'a Field<D> {
-        let read = |start: usize, part: &mut [f64]| self.read(start, part);
         self.whole.get_or_init(|| {
-            Field::read_from(*self.stored.grid(), &read).expect("stored values are finite")
+            Field::read_from(*self.stored.grid(), &|start, part| self.read(start, part))
+                .expect("stored values are finite")
         })
-    }
-
-    /// Writes the values of the whole grid from a node on, whole rows of bricks: those that are stored, and outside of the region the
-    /// initial ones, which it keeps even where nothing is stored.
-    pub(crate) fn read(&self, start: usize, part: &mut [f64]) {
-        self.stored.read(start, part);
-        if let Some(region) = self.region {
-            let moved = part.to_vec();
-            self.initial.read(start, part);
-            for range in region.within(start, moved.len()) {
-                part[range.clone()].copy_from_slice(&moved[range]);
-            }
-        }
     }
 }
 
@@ -66,6 +53,18 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
             self.initial.at(place)
         } else {
             self.stored.at(place)
+        }
+    }
+
+    /// The values that are stored, and outside of the region the initial ones, which it keeps even where nothing is stored.
+    fn read(&self, start: usize, part: &mut [f64]) {
+        self.stored.read(start, part);
+        if let Some(region) = self.region {
+            let moved = part.to_vec();
+            self.initial.read(start, part);
+            for range in region.within(start, moved.len()) {
+                part[range.clone()].copy_from_slice(&moved[range]);
+            }
         }
     }
 }

@@ -118,7 +118,7 @@ impl<const D: usize> Measure<D> {
         exact: impl Fn(Grid<D>, f64) -> Result<Field<D>, geometry::Error> + Send + Sync + 'static,
     ) -> Self {
         Self::new("l2", move |u, time| {
-            l2_distance(u, &exact(*u.grid(), time)?).map(Some)
+            l2_distance(u, &exact(*u.nodes().grid(), time)?).map(Some)
         })
     }
 

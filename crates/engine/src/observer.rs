@@ -27,10 +27,7 @@ impl<const D: usize> Event<'_, D> {
     /// Writes the phase field to a file of the run; nothing where the run is not stored.
     pub fn write_field(&mut self, name: &str) -> Result<(), Error> {
         if let Some(directory) = &mut self.directory {
-            let (path, now) = (directory.path().join(name), self.run.current());
-            npy::write_parts(path, self.run.case.grid(), &|start, part| {
-                now.read(start, part);
-            })?;
+            npy::write(directory.path().join(name), &self.run.current())?;
             directory.adopt_file(name)?;
         }
         Ok(())

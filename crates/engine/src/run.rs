@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use fem::FiniteElementStep;
-use geometry::measure::{has_interface, l2_distance_of_parts};
+use geometry::measure::{has_interface, l2_distance};
 use geometry::{Field, NodeSet, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
@@ -268,11 +268,7 @@ impl<const D: usize> Run<D> {
     fn distance(&self, a: &Stored<D>, b: &Stored<D>) -> f64 {
         let whole = OnceLock::new();
         let [a, b] = [a, b].map(|stored| self.case.current(stored, &whole));
-        l2_distance_of_parts(
-            self.case.grid(),
-            &|start, part| a.read(start, part),
-            &|start, part| b.read(start, part),
-        )
+        l2_distance(&a, &b).expect("both are on the grid of the case")
     }
 
     /// The measures of the initial phase field.

@@ -3,25 +3,31 @@
 //! Sums run in parallel over fixed chunks, so that results do not depend on the number of threads.
 
 use crate::error::positive;
-use crate::parallel::Reader;
 use crate::profile::profile_variable;
-use crate::{Error, Field, Grid, PhaseField, parallel};
+use crate::{Error, PhaseField, parallel};
 
-/// `L2` norm `sqrt(h^D sum (a - b)^2)` of the difference: the trapezoidal rule on the periodic box, not a mean.
+/// `L2` norm `sqrt(h^D sum (a - b)^2)` of the difference: the trapezoidal rule on the periodic box, not a mean. The sum is over the whole grid,
+/// in its order, wherever the values are stored.
 ///
 /// # Errors
 /// Both fields must live on the same grid.
-pub fn l2_distance<const D: usize>(a: &Field<D>, b: &Field<D>) -> Result<f64, Error> {
-    a.grid().same_as(b.grid())?;
-    let (v, w) = (a.values(), b.values());
-    let sum = parallel::sum(v.len(), |i| (v[i] - w[i]) * (v[i] - w[i]));
-    Ok((a.grid().cell_volume() * sum).sqrt())
-}
-
-/// The same for fields of which not the whole is in memory: `a` and `b` write the values of nodes in a row from one on, whose number is a
-/// multiple of 4096.
-pub fn l2_distance_of_parts<const D: usize>(grid: &Grid<D>, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
-    (grid.cell_volume() * parallel::squared_distance(grid.len(), a, b)).sqrt()
+pub fn l2_distance<const D: usize>(
+    a: &impl PhaseField<D>,
+    b: &impl PhaseField<D>,
+) -> Result<f64, Error> {
+    let grid = a.nodes().grid();
+    grid.same_as(b.nodes().grid())?;
+    let fields: [&dyn PhaseField<D>; 2] = [a, b];
+    let sum = parallel::sum_of_chunks(grid.len(), &|nodes| {
+        let [a, b] = fields.map(|field| {
+            let mut values = vec![0.0; nodes.len()];
+            field.read(nodes.start, &mut values);
+            values
+        });
+        let pairs = a.iter().zip(&b);
+        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+    });
+    Ok((grid.cell_volume() * sum).sqrt())
 }
 
 /// Whether there is an interface at all.

@@ -127,6 +127,16 @@ pub trait PhaseField<const D: usize>: Sync {
         self.value(self.nodes().at(place))
     }
 
+    /// Writes the values on the whole grid of so many nodes in a row from `start` on into `part`. Where the field is on bricks, both the start
+    /// and the number must be multiples of their side.
+    fn read(&self, start: usize, part: &mut [f64]) {
+        let values = self.values();
+        match self.nodes().bricks() {
+            Some(bricks) => bricks.read(values, self.rests(), start, part),
+            None => part.copy_from_slice(&values[start..][..part.len()]),
+        }
+    }
+
     /// Checks that no value is NaN or infinite.
     ///
     /// # Errors

@@ -27,8 +27,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::grid::digits;
-use crate::parallel::{CHUNK, Reader};
-use crate::{Error, Field, Grid};
+use crate::parallel::CHUNK;
+use crate::{Error, Field, Grid, PhaseField};
 pub use error::NpyError;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
@@ -39,34 +39,22 @@ const MOST_AXES: usize = 64;
 /// The header is padded so that the data start at a multiple of this.
 const ALIGNMENT: usize = 64;
 
-/// Writes a field, atomically (see [`write_atomically`]).
+/// Writes a field on its whole grid, atomically (see [`write_atomically`]). What is not stored of it is never in memory as a whole.
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write<const D: usize>(path: impl AsRef<Path>, field: &Field<D>) -> Result<(), Error> {
-    let values = field.values();
-    let read =
-        |start: usize, part: &mut [f64]| part.copy_from_slice(&values[start..][..part.len()]);
-    write_parts(path, field.grid(), &read)
-}
-
-/// The same for a field of which not the whole is in memory: `read` writes the values of nodes in a row from one on, whose number is a
-/// multiple of 4096.
-///
-/// # Errors
-/// [`Error::Io`].
-pub fn write_parts<const D: usize>(
+pub fn write<const D: usize>(
     path: impl AsRef<Path>,
-    grid: &Grid<D>,
-    read: &Reader<'_>,
+    field: &impl PhaseField<D>,
 ) -> Result<(), Error> {
+    let grid = field.nodes().grid();
     let header = header(&grid.shape());
     Ok(write_atomically(path, |out| {
         out.write_all(&header)?;
         let mut part = vec![0.0; CHUNK];
         for start in (0..grid.len()).step_by(CHUNK) {
             let part = &mut part[..CHUNK.min(grid.len() - start)];
-            read(start, part);
+            field.read(start, part);
             let mut values = part.iter();
             values.try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
         }

@@ -93,30 +93,14 @@ pub fn values(len: usize, f: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
 
 /// `sum of term(i) for i in 0..len`: partial sums over fixed chunks, added in order.
 pub(crate) fn sum(len: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let parts = map(len.div_ceil(CHUNK), 1, &|chunk| {
-        (chunk * CHUNK..len.min((chunk + 1) * CHUNK))
-            .map(&term)
-            .sum()
-    });
-    total(&parts)
+    sum_of_chunks(len, &|indices| indices.map(&term).sum())
 }
 
-/// The sum of the squares of the differences of so many values that two functions write, in the order of [`sum`].
-pub(crate) fn squared_distance(len: usize, a: &Reader<'_>, b: &Reader<'_>) -> f64 {
+/// The same, of partial sums that `part` makes of the indices of a chunk.
+pub(crate) fn sum_of_chunks(len: usize, part: &(dyn Fn(Range<usize>) -> f64 + Sync)) -> f64 {
     let parts = map(len.div_ceil(CHUNK), 1, &|chunk| {
-        let first = chunk * CHUNK;
-        let [a, b] = [a, b].map(|read| {
-            let mut values = vec![0.0; CHUNK.min(len - first)];
-            read(first, &mut values);
-            values
-        });
-        let pairs = a.iter().zip(b);
-        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+        part(chunk * CHUNK..len.min((chunk + 1) * CHUNK))
     });
-    total(&parts)
-}
-
-/// Not `sum`, which is -0.0 of nothing.
-fn total(parts: &[f64]) -> f64 {
+    // Not `sum`, which is -0.0 of nothing.
     parts.iter().fold(0.0, |total, part| total + part)
 }

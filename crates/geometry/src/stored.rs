@@ -25,9 +25,7 @@ pub struct Stored<const D: usize> {
 /// Without its pure phases, as [`Stored::read_from`].
 impl<const D: usize> From<Field<D>> for Stored<D> {
     fn from(u: Field<D>) -> Self {
-        let values = u.values();
-        let read =
-            |start: usize, part: &mut [f64]| part.copy_from_slice(&values[start..][..part.len()]);
+        let read = |start: usize, part: &mut [f64]| u.read(start, part);
         Self::without_phases(*u.grid(), &read).unwrap_or_else(|| Self::whole(u))
     }
 }
@@ -110,14 +108,6 @@ impl<const D: usize> Stored<D> {
         match self.nodes.bricks() {
             Some(bricks) => bricks.scatter(&self.values, self.rests),
             None => self.values.clone(),
-        }
-    }
-
-    /// Writes the values of the whole grid for nodes in a row from one on; where it is on bricks, both multiples of their sides.
-    pub fn read(&self, start: usize, part: &mut [f64]) {
-        match self.nodes.bricks() {
-            Some(bricks) => bricks.read(&self.values, self.rests, start, part),
-            None => part.copy_from_slice(&self.values[start..][..part.len()]),
         }
     }
 

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use geometry::shapes::{Ball, Cuboid, Torus};
 use geometry::{
-    Error, Field, Grid, SignedDistanceExt, distance_from_phase_field, exact, measure,
-    optimal_profile, phase_field,
+    Error, Field, Grid, PhaseField, SignedDistanceExt, Stored, distance_from_phase_field, exact,
+    measure, npy, optimal_profile, phase_field,
 };
 
 const ORIGIN: [f64; 2] = [0.0, 0.0];
@@ -41,15 +41,24 @@ fn l2_distance_is_exact_for_trigonometric_functions() {
 /// On more nodes than are read at a time, the last time not all of them.
 #[test]
 fn fields_in_parts_are_those_in_memory() {
-    let grid = Grid::<2>::centred(96, 1.5).unwrap();
-    let [a, b] = [1.0, 2.0].map(|k| Field::from_fn(grid, |[x, y]| (k * x + y * y).sin()));
-    let read = |field: &Field<2>| {
-        let values = field.values().to_vec();
-        move |start: usize, part: &mut [f64]| part.copy_from_slice(&values[start..][..part.len()])
-    };
-    assert_eq!(Field::read_from(grid, &read(&a)).unwrap(), a);
-    let distance = measure::l2_distance(&a, &b).unwrap();
-    let of_parts = measure::l2_distance_of_parts(&grid, &read(&a), &read(&b));
+    let whole = [0.2, 0.3].map(|radius| ball::<2>(96, radius, 1.0 / 64.0));
+    let stored = whole.clone().map(Stored::<2>::from);
+    let (grid, folder) = (*whole[0].grid(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("u.npy");
+    for (u, whole) in stored.iter().zip(&whole) {
+        assert!(u.values().len() < grid.len());
+        let read = Field::read_from(grid, &|start, part| u.read(start, part));
+        assert_eq!(read.unwrap(), *whole);
+        npy::write(&path, u).unwrap();
+        assert_eq!(npy::read(&path, |_| Ok(grid)).unwrap(), *whole);
+    }
+    let pairs = whole[0].values().iter().zip(whole[1].values());
+    let squares: Vec<f64> = pairs.map(|(a, b)| (a - b) * (a - b)).collect();
+    let sums = squares.chunks(4096).map(|part| part.iter().sum::<f64>());
+    let expected = (grid.cell_volume() * sums.sum::<f64>()).sqrt();
+    let distance = measure::l2_distance(&whole[0], &whole[1]).unwrap();
+    assert_eq!(distance.to_bits(), expected.to_bits());
+    let of_parts = measure::l2_distance(&stored[0], &stored[1]).unwrap();
     assert_eq!(of_parts.to_bits(), distance.to_bits());
     let broken = Field::read_from(grid, &|_, part: &mut [f64]| part.fill(f64::NAN));
     assert!(matches!(broken, Err(Error::NonFinite { index: 0, .. })));
