@@ -138,7 +138,7 @@ pub fn run(
             reader.whole = Some((job.device.kind(), Flow::MeanCurvature));
             reader.load()
         }
-        command => command.options().reader(messages)?.load(),
+        RunCommand::Flow(flow) => flow.run.reader(messages)?.load(),
     };
     match loaded? {
         Loaded::Plane(start) => job.start(start),
