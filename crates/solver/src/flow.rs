@@ -284,7 +284,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.current.shape().num_elements()
     }
 
-    /// The phase field now, on the device: on the whole grid, or on its active [`Bricks`].
+    /// The phase field now, on the device: on the whole grid, or on its active [bricks](geometry::Bricks).
     pub fn current(&self) -> &Tensor<D> {
         &self.current
     }
