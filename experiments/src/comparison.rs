@@ -330,7 +330,9 @@ impl Comparison<'_> {
         let mut exact = chart("to the exact flow", largest, |run| &run.from_exact);
         let (mut entries, styles) = (Vec::new(), [LineStyle::Solid, LineStyle::Dotted]);
         for ((label, reached), style) in self.second_order.iter().zip(styles) {
-            let series = Series::of(label, reached, |at| [time(at.mark), at.distance]);
+            let series = Series::of(label, reached, |at| {
+                [time(at.mark), at.numbers["distance_to_exact"]]
+            });
             let series = series.with_colour(Colour::Grey).with_style(style);
             exact = exact.with_curves([series.with_marker(Marker::Circle)]);
             entries.push(LegendEntry::line(label, Colour::Grey, style));

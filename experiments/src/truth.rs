@@ -326,22 +326,26 @@ pub fn at<const D: usize>(run: &Trajectory<D>, time: f64) -> &Record {
 /// What a run has reached at a time at which one of its steps ends.
 pub struct Reached {
     pub mark: usize,
-    /// Those of the [exact flow](Truth).
-    pub sizes: Numbers,
+    /// The sizes of its zero level, as those of the [exact flow](Truth), and `distance_to_exact`, the largest distance to that; `hvp_total`,
+    /// `seconds` and `steps`, all so far; of controlled steps `estimated_error` in time, absent after the first three.
+    pub numbers: Numbers,
+    /// The sizes of the exact flow.
+    pub exact: Numbers,
     points: Vec<[f64; 2]>,
-    /// The largest distance of the zero level to the exact curve or surface.
-    pub distance: f64,
-    /// All Hessian-vector products so far,
-    pub hvp: f64,
-    /// seconds,
-    pub seconds: f64,
-    /// and steps.
-    pub steps: usize,
-    /// The estimated time error of controlled steps; none after the first three.
-    pub estimated: Option<f64>,
 }
 
 impl Reached {
+    fn new(exact: &Truth, points: Vec<[f64; 2]>, mut numbers: Numbers) -> Self {
+        let distance = exact.outline.largest_distance_of(&points);
+        numbers.insert("distance_to_exact", distance);
+        Self {
+            mark: exact.mark,
+            numbers,
+            exact: exact.sizes.clone(),
+            points,
+        }
+    }
+
     /// Compares a run of a sample with the exact flow at a time.
     pub fn of<const D: usize>(
         sample: &Sample<D>,
@@ -352,56 +356,50 @@ impl Reached {
         let last = at(run, exact.time());
         let (field, eps) = (run.field(last.step)?, run.case.scales.eps);
         let zero_set = ZeroSet::of(&field, eps)?;
-        let points = (sample.level)(&field, eps)?;
         let size = |name| match (D, name) {
             (2, "area") | (_, "volume") => zero_set.volume,
             (_, "area" | "perimeter") => zero_set.perimeter,
             (_, "w") => zero_set.willmore_energy,
             (_, name) => last.measure(name).unwrap_or(f64::NAN),
         };
-        Ok(Self {
-            mark: exact.mark,
-            sizes: exact.sizes.keys().map(|&name| (name, size(name))).collect(),
-            distance: exact.outline.largest_distance_of(&points),
-            points,
-            hvp: total_hvp(so_far),
-            seconds: so_far.iter().map(|record| record.seconds).sum(),
-            steps: so_far.len(),
-            estimated: estimated_time_error(so_far),
-        })
+        let sizes = exact.sizes.keys().map(|&name| (name, size(name)));
+        let work = [
+            ("hvp_total", total_hvp(so_far)),
+            ("seconds", so_far.iter().map(|record| record.seconds).sum()),
+            ("steps", so_far.len() as f64),
+        ];
+        let estimated = estimated_time_error(so_far).map(|error| ("estimated_error", error));
+        let numbers = sizes.chain(work).chain(estimated).collect();
+        Ok(Self::new(exact, (sample.level)(&field, eps)?, numbers))
     }
 
-    /// Adds it as metrics `KEY.NAME.stepMARK`.
+    /// Adds its numbers, but `seconds`, as metrics `KEY.NAME.stepMARK`.
     fn record(&self, session: &mut Session, key: &str) -> Result<()> {
-        let mut numbers = self.sizes.clone();
-        numbers.extend([
-            ("distance_to_exact", self.distance),
-            ("hvp_total", self.hvp),
-            ("steps", self.steps as f64),
-        ]);
-        numbers.extend(self.estimated.map(|error| ("estimated_error", error)));
+        let mut numbers = self.numbers.clone();
+        numbers.remove("seconds");
         record(session, key, self.mark, &numbers)
     }
 
     /// The same at `eps = 0` from runs at `2 eps` and at `eps`, the error being of second order in `eps`: sizes are `(4 b - a) / 3`, and the
-    /// points of the finer level move on by a third of the way from the coarser one. The work is that of both.
+    /// points of the finer level move on by a third of the way from the coarser one. The work is that of both, and the estimated error the
+    /// larger one.
     fn extrapolated(double: &Self, single: &Self, exact: &Truth) -> Self {
-        let size = |(name, b): (&&'static str, &f64)| (*name, (4.0 * b - double.sizes[name]) / 3.0);
+        let number = |(&name, b): (&&'static str, &f64)| {
+            let a = double.numbers.get(name)?;
+            let number = match name {
+                "hvp_total" | "seconds" | "steps" => a + b,
+                "estimated_error" => a.max(*b),
+                _ => (4.0 * b - a) / 3.0,
+            };
+            Some((name, number))
+        };
         let moved = |p: &[f64; 2]| {
             let [x, y] = nearest(&double.points, *p);
             [p[0] + (p[0] - x) / 3.0, p[1] + (p[1] - y) / 3.0]
         };
-        let points: Vec<[f64; 2]> = single.points.iter().map(moved).collect();
-        Self {
-            mark: exact.mark,
-            sizes: single.sizes.iter().map(size).collect(),
-            distance: exact.outline.largest_distance_of(&points),
-            points,
-            hvp: double.hvp + single.hvp,
-            seconds: double.seconds + single.seconds,
-            steps: double.steps + single.steps,
-            estimated: (double.estimated.zip(single.estimated)).map(|(a, b)| a.max(b)),
-        }
+        let points = single.points.iter().map(moved).collect();
+        let numbers = single.numbers.iter().filter_map(number).collect();
+        Self::new(exact, points, numbers)
     }
 }
 

@@ -84,13 +84,8 @@ pub fn program(options: &Options) -> Result<()> {
     setting.run(session, TITLE, &surfaces, time, comparisons)
 }
 
-/// A surface of revolution in controlled steps, or extrapolated, and the sizes of the exact flow.
-struct Compared {
-    title: &'static str,
-    run: String,
-    reached: Reached,
-    exact: Numbers,
-}
+/// A surface of revolution, its run in controlled steps or extrapolated, and what that has reached.
+type Compared = (&'static str, String, Reached);
 
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
 /// 1, 2, 4, ... 64 and all steps of the paper.
@@ -112,32 +107,27 @@ fn compare_with_exact(
     let mut rows = Vec::new();
     let names = [format!("n = {n}"), "extrapolated".to_owned()];
     for (run, reached) in names.into_iter().zip(runs) {
-        rows.extend(exact.iter().zip(reached).map(|(exact, reached)| Compared {
-            title: sample.title,
-            run: run.clone(),
-            reached,
-            exact: exact.sizes.clone(),
-        }));
+        let reached = reached.into_iter();
+        rows.extend(reached.map(|reached| (sample.title, run.clone(), reached)));
     }
     Ok(rows)
 }
 
 fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     let mut sheet = Sheet::of(rows)
-        .text("surface", |row| row.title)
-        .text("run", |row| &row.run)
-        .column("step", Shortest, |row| row.reached.mark);
+        .text("surface", |row| row.0)
+        .text("run", |row| &row.1)
+        .column("step", Shortest, |row| row.2.mark);
     for (name, digits) in [("area", 5), ("volume", 5), ("w", 3)] {
+        let (exact, format) = (format!("exact {name}"), Fixed(digits));
         sheet = sheet
-            .column(name, Fixed(digits), |row| row.reached.sizes[name])
-            .column(format!("exact {name}"), Fixed(digits), |row| {
-                row.exact[name]
-            });
+            .column(name, format, |row| row.2.numbers[name])
+            .column(exact, format, |row| row.2.exact[name]);
     }
-    let distance = |row: &Compared| row.reached.distance * n as f64;
+    let distance = |row: &Compared| row.2.numbers["distance_to_exact"] * n as f64;
     sheet
         .column("largest distance / h", Fixed(3), distance)
-        .column("HVP", Fixed(0), |row| row.reached.hvp)
+        .column("HVP", Fixed(0), |row| row.2.numbers["hvp_total"])
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.

@@ -32,29 +32,17 @@ struct Measurement {
     mcf: Vec<[f64; MCF_STEPS.len()]>,
     /// `w` with the implicit finite-element step and the mass-matrix norm, as the paper measures.
     w_elements: f64,
-    /// Willmore flow by the learned operator, in every scheme.
-    willmore: Vec<Still>,
+    /// Willmore flow by the learned operator, in every scheme: [`MEASURES`] and `energy_increases`.
+    willmore: Vec<Numbers>,
 }
 
-struct Still {
-    /// `w` of the start as the scheme measures it, by its factors of calibration.
-    w_learned: f64,
-    /// `w` of the end: the profile is now the one of the scheme, which the calibration is about.
-    w_relaxed: f64,
-    /// Radius of the ball with the final volume, less that at the beginning, in cells.
-    radius_change_over_h: f64,
-    energy_increases: usize,
-    hvp_per_step: f64,
-}
-
-/// Measures of standing still: metric, heading, digits, value.
-const MEASURES: [(&str, &str, usize, fn(&Still) -> f64); 4] = [
-    ("w_learned", "w", 2, |s| s.w_learned),
-    ("w_relaxed", "w in the end", 2, |s| s.w_relaxed),
-    ("radius_change_over_h", "change of radius / h", 4, |s| {
-        s.radius_change_over_h
-    }),
-    ("hvp_per_step", "HVP/step", 1, |s| s.hvp_per_step),
+/// Measures of standing still: `w` of the start as the scheme measures it, by its factors of calibration; that of the end, where the profile is the
+/// one of the scheme, which the calibration is about; radius of the ball with the final volume, less that at the beginning, in cells; the work.
+const MEASURES: [(&str, Format, &str); 4] = [
+    ("w", Fixed(2), "w_learned"),
+    ("w in the end", Fixed(2), "w_relaxed"),
+    ("change of radius / h", Fixed(4), "radius_change_over_h"),
+    ("HVP/step", Fixed(1), "hvp_per_step"),
 ];
 
 /// Methods and schemes of mean curvature flow.
@@ -128,18 +116,19 @@ fn measure(
     for &scheme in Method::Hybrid.schemes(Flow::Willmore) {
         let run = stage.run(case((Method::Hybrid, scheme), TAU, willmore_steps)?)?;
         let (records, last) = (run.records(), run.records().last());
-        let first = records.first().and_then(|record| record.minimization);
         // Of the ball with that volume.
         let radius = |volume: f64| (0.75 * volume / PI).cbrt();
         let end = last.map_or(f64::NAN, |record| record.measures["volume"]);
         let change = radius(end) - radius(run.start()["volume"]);
-        willmore.push(Still {
-            w_learned: first.map_or(f64::NAN, |made| made.energy_at_rest()),
-            w_relaxed: last.and_then(Record::willmore_energy).unwrap_or(f64::NAN),
-            radius_change_over_h: change * setting.n as f64,
-            energy_increases: energy_increases(records),
-            hvp_per_step: mean_hvp(records),
-        });
+        let w_learned = records.first().and_then(Record::energy_at_rest);
+        let w_relaxed = last.and_then(Record::willmore_energy);
+        willmore.push(Numbers::from([
+            ("w_learned", w_learned.unwrap_or(f64::NAN)),
+            ("w_relaxed", w_relaxed.unwrap_or(f64::NAN)),
+            ("radius_change_over_h", change * setting.n as f64),
+            ("energy_increases", energy_increases(records) as f64),
+            ("hvp_per_step", mean_hvp(records)),
+        ]));
     }
     let still = case(PAPERS, TAU, 0)?;
     let (elements, u) = (still.implicit_elements()?, still.initial.field()?);
@@ -172,12 +161,12 @@ fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
             other => format!("{}.", Method::Hybrid.key_in(other)),
         };
         let label = Method::Hybrid.label_in(scheme);
-        for (name, head, digits, value) in MEASURES {
-            let (name, head) = (format!("{prefix}{name}"), format!("{head}, {label}"));
-            sheet = sheet.measure(&name, (&head, Fixed(digits)), |m| value(&m.willmore[k]));
+        for (head, format, name) in MEASURES {
+            let (metric, head) = (format!("{prefix}{name}"), format!("{head}, {label}"));
+            sheet = sheet.measure(&metric, (&head, format), |m| m.willmore[k][name]);
         }
-        let increases = format!("{prefix}energy_increases");
-        sheet = sheet.metric(&increases, |m| m.willmore[k].energy_increases);
+        let increases = |m: &Measurement| m.willmore[k]["energy_increases"];
+        sheet = sheet.metric(&format!("{prefix}energy_increases"), increases);
     }
     sheet
 }
@@ -208,8 +197,10 @@ fn errors(all: &[Measurement]) -> LineChart {
 fn energies(all: &[Measurement]) -> LineChart {
     let elements = Series::of("implicit FE measure", all, |m| [m.radius, m.w_elements]);
     let schemes = Method::Hybrid.schemes(Flow::Willmore).iter().enumerate();
-    let relaxed = schemes
-        .map(|(k, &scheme)| curve((Method::Hybrid, scheme), all, |m| m.willmore[k].w_relaxed));
+    let relaxed = schemes.map(|(k, &scheme)| {
+        let w = |m: &Measurement| m.willmore[k]["w_relaxed"];
+        curve((Method::Hybrid, scheme), all, w)
+    });
     let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE])
         .with_colour(Colour::Black)
         .with_style(LineStyle::Dashed);

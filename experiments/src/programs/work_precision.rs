@@ -122,13 +122,8 @@ pub fn program(Options { run: options }: &Options) -> Result<()> {
         session.metrics("estimates", metrics)?;
     }
     circles(&mut session)?;
-    let work: [(_, _, fn(&Reached) -> f64); 2] = [
-        ("work_precision", "HVPs", |reached| reached.hvp),
-        ("seconds", "seconds", |reached| reached.seconds),
-    ];
-    for (stem, axis, work) in work {
-        session.figure(figure(&rows, marks, axis, work), stem)?;
-    }
+    session.figure(figure(&rows, marks, "HVPs", "hvp_total"), "work_precision")?;
+    session.figure(figure(&rows, marks, "seconds", "seconds"), "seconds")?;
     session.sheet(sheet(&rows), "errors")?;
     session.finish(TITLE)
 }
@@ -265,32 +260,30 @@ fn circles(session: &mut Session) -> Result<()> {
     Ok(())
 }
 
+const COLUMNS: [(&str, Format, &str); 5] = [
+    ("largest distance", Scientific(2), "distance_to_exact"),
+    ("estimated time error", Scientific(1), "estimated_error"),
+    ("steps", Shortest, "steps"),
+    ("HVP", Fixed(0), "hvp_total"),
+    ("s", Fixed(1), "seconds"),
+];
+
 fn sheet<'a>(rows: &'a [Compared<'a>]) -> Sheet<'a, Compared<'a>> {
     let key = |row: &Compared<'_>, name: &str| {
         let (stepping, mark) = (&row.stepping.key, row.reached.mark);
         format!("{}.n{}.{stepping}.{name}.step{mark}", row.sample, row.n)
     };
-    let [distance, estimate] = ["largest distance", "estimated time error"];
     Sheet::of(rows)
         .keyed(key)
         .text("shape", |row| row.sample)
         .column("n", Shortest, |row| row.n)
         .text("time steps", |row| row.stepping.key.as_str())
         .column("time / 2⁻¹⁴", Shortest, |row| row.reached.mark)
-        .numbers(&[], |row| &row.reached.sizes)
-        .measure("distance_to_exact", (distance, Scientific(2)), |row| {
-            row.reached.distance
-        })
-        .measure("estimated_error", (estimate, Scientific(1)), |row| {
-            row.reached.estimated
-        })
-        .measure("steps", ("steps", Shortest), |row| row.reached.steps)
-        .measure("hvp_total", ("HVP", Fixed(0)), |row| row.reached.hvp)
-        .measure("seconds", ("s", Fixed(1)), |row| row.reached.seconds)
+        .numbers(&COLUMNS, |row| &row.reached.numbers)
 }
 
-/// Largest distances from the exact flow against work, for the second and the last mark.
-fn figure(rows: &[Compared<'_>], marks: &[usize], axis: &str, work: fn(&Reached) -> f64) -> Figure {
+/// Largest distances from the exact flow against work, a number of this name, for the second and the last mark.
+fn figure(rows: &[Compared<'_>], marks: &[usize], axis: &str, work: &str) -> Figure {
     let mut shown: Vec<usize> = vec![marks[1.min(marks.len() - 1)], marks[marks.len() - 1]];
     shown.dedup();
     let [coarse, fine] = CELLS;
@@ -308,7 +301,7 @@ fn figure(rows: &[Compared<'_>], marks: &[usize], axis: &str, work: fn(&Reached)
                         stepping && (row.sample, row.reached.mark) == (key, mark)
                     });
                     let mut curve = Series::of(format!("{kind}, {grid}"), own, |row| {
-                        [work(&row.reached), row.reached.distance]
+                        [work, "distance_to_exact"].map(|name| row.reached.numbers[name])
                     });
                     curve.points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                     let curve = curve.with_colour(colour).with_style(style);
