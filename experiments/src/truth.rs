@@ -327,7 +327,7 @@ pub fn at<const D: usize>(run: &Trajectory<D>, time: f64) -> &Record {
 pub struct Reached {
     pub mark: usize,
     /// The sizes of its zero level, as those of the [exact flow](Truth), and `distance_to_exact`, the largest distance to that; `hvp_total`,
-    /// `seconds` and `steps`, all so far; of controlled steps `estimated_error` in time, absent after the first three.
+    /// `seconds` and `steps`, all so far; of steps of second order `estimated_error` in time, absent in the first three.
     pub numbers: Numbers,
     /// The sizes of the exact flow.
     pub exact: Numbers,

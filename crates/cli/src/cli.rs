@@ -592,7 +592,8 @@ impl MessageOptions {
 
 /// Writes to standard output. A closed pipe (`| head`) is no failure.
 pub fn write_out(text: &[u8]) -> Result<()> {
-    match std::io::stdout().write_all(text) {
+    let mut out = std::io::stdout();
+    match out.write_all(text).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(files::Error::of("write", "standard output")(error).into())
         }

@@ -312,7 +312,9 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
 pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
     let stored = match RunDirectory::recover(folder) {
         Ok(stored) => stored,
-        Err(locked @ runs::Error::Locked(_)) => return Err(locked.into()),
+        Err(error @ (runs::Error::Locked(_) | runs::Error::Version { .. })) => {
+            return Err(error.into());
+        }
         Err(_) => return Ok(()),
     };
     let whole = |path: &Path| path.canonicalize().ok();

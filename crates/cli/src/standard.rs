@@ -70,7 +70,8 @@ impl Standard {
         if !path.exists() {
             refuse!("nothing is written to standard output: the shape has vanished");
         }
-        let written = std::io::stdout().write_all(&files::read(path)?);
+        let (bytes, mut out) = (files::read(path)?, std::io::stdout());
+        let written = out.write_all(&bytes).and_then(|()| out.flush());
         Ok(written.map_err(files::Error::of("write", "standard output"))?)
     }
 }

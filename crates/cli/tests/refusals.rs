@@ -482,10 +482,16 @@ fn every_mistake_is_one_clear_line() {
 #[cfg(target_os = "linux")]
 #[test]
 fn what_does_not_fit_into_memory_is_refused_before_it_takes_long() {
+    if operators::memory::available().is_some_and(|bytes| bytes > 290e9) {
+        return common::skip("a refusal", "there is memory for it");
+    }
     let folder = tempfile::tempdir().unwrap();
     let arguments = "flow builtin:figure --cells 990 --storage dense --output run";
     let arguments: Vec<&str> = arguments.split(' ').collect();
+    let clock = std::time::Instant::now();
     let output = run(folder.path(), &arguments);
+    // The distances take minutes.
+    assert!(clock.elapsed().as_secs() < 20);
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(
@@ -493,7 +499,6 @@ fn what_does_not_fit_into_memory_is_refused_before_it_takes_long() {
         "{stderr}"
     );
     assert!(stderr.contains("or bricks near the surface"), "{stderr}");
-    assert!(!stderr.contains("signed distance"), "{stderr}");
     assert!(!folder.path().join("run").exists());
 }
 

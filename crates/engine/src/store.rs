@@ -84,8 +84,8 @@ impl Store {
         Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 
-    /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The files of its
-    /// end, which `ends` names, stay and are no longer part of it.
+    /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The table of its
+    /// records and the files of its end, which `ends` names, stay and are no longer part of it.
     ///
     /// # Errors
     /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already, and of Willmore flow for another end time, since steps
@@ -183,13 +183,13 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Stored<D>, Option<
     Ok((initial, region.transpose()?))
 }
 
-/// All records of a stored run with their wall times, where those are known.
+/// All records of a stored run with their wall times, which are not a number where they are lost: the file is not checked.
 pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
     let mut records: Vec<Record> = read(stored, &stored.state().notes["records"])?;
     let timings = stored.read(TIMINGS).unwrap_or_default();
-    let timings: Vec<f64> = serde_json::from_slice(&timings).unwrap_or_default();
-    for (record, seconds) in records.iter_mut().zip(timings) {
-        record.seconds = seconds;
+    let timings: Vec<Option<f64>> = serde_json::from_slice(&timings).unwrap_or_default();
+    for (k, record) in records.iter_mut().enumerate() {
+        record.seconds = timings.get(k).copied().flatten().unwrap_or(f64::NAN);
     }
     Ok(records)
 }

@@ -32,8 +32,8 @@ pub struct Trajectory<const D: usize> {
 }
 
 impl<const D: usize> Trajectory<D> {
-    /// Runs a case, or continues it, or only looks up what is stored in `folder`; a folder with a stored run of another case is
-    /// replaced with all that is in it, one that holds anything but a run is refused. None if it was interrupted.
+    /// Runs a case, or continues it, or only looks up what is stored in `folder`; a folder with a stored run of another case, or of another
+    /// version of its format, is replaced with all that is in it, one that holds anything but a run is refused. None if it was interrupted.
     pub fn of(
         case: Case<D>,
         device: &ComputeDevice,
@@ -124,7 +124,7 @@ impl<const D: usize> Trajectory<D> {
         }
     }
 
-    /// Wall time of all steps in seconds, interruptions left out.
+    /// Wall time of all steps in seconds, interruptions left out; not a number if some of it is lost.
     pub fn seconds(&self) -> f64 {
         self.records.iter().map(|record| record.seconds).sum()
     }
@@ -149,7 +149,7 @@ impl<const D: usize> Trajectory<D> {
     }
 }
 
-/// The stored run of a case, if there is one to go on from. A run of another case, or one that is damaged beyond its checkpoints, is removed
+/// The stored run of a case, if there is one to go on from. A run of another case or format, or one that is damaged beyond its checkpoints, is removed
 /// with its folder: it can be computed again.
 fn found<const D: usize>(
     case: &Case<D>,

@@ -109,6 +109,13 @@ fn an_interrupted_run_continues_with_the_same_bytes() {
             [true, false, false]
         );
         assert_eq!(again.distance(4, &reference, 4).unwrap().to_bits(), 0);
+        // Wall times are no result: without them all else is there.
+        for lost in ["", "[0.1, 0.2"] {
+            std::fs::write(twice.join(engine::TIMINGS), lost).unwrap();
+            let without = trajectory(&whole, &twice, &samples);
+            assert_eq!(without_seconds(&without), without_seconds(&resumed));
+            assert!(without.seconds().is_nan());
+        }
         let volume = |step: usize| reference.measures(step).unwrap()["volume"];
         assert_eq!(volume(4) > volume(0), flow == Flow::Willmore);
         assert!(reference.measures(5).is_none());

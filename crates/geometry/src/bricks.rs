@@ -358,7 +358,7 @@ impl<const D: usize> Bricks<D> {
     }
 
     /// Fills a part of the whole grid from a cell on, both multiples of the side.
-    pub fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
+    pub(crate) fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
         // A row of a brick lies in one row of the grid.
         for (k, row) in part.chunks_exact_mut(self.side()).enumerate() {
             let index = digits(start + (k << self.bits), self.cells());

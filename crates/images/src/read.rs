@@ -54,7 +54,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
 
 /// The image in the bytes of a file; see [`read`].
 pub fn decode(bytes: &[u8]) -> Result<Image, FormatError> {
-    upright(bytes, Tones::Grey).map(converted)
+    upright(bytes, Wanted::Grey).map(converted)
 }
 
 /// The image in the bytes of a file with its colours and opacities, 8 bits each; `path` is for messages.
@@ -63,7 +63,9 @@ pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
         path: path.as_ref().into(),
         problem,
     };
-    let image = upright(bytes, Tones::Colours).map_err(format)?.into_rgba8();
+    let image = upright(bytes, Wanted::Colours)
+        .map_err(format)?
+        .into_rgba8();
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
     let picture = Picture::new([image.width(), image.height()], pixels);
     picture.map_err(|error| format(FormatError::damaged("image", &error.to_string())))
@@ -71,7 +73,7 @@ pub fn colours(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Picture, Error> {
 
 /// Whether the image in the bytes of a file has more than 8 bits for a value, which [`colours`] leaves out.
 pub fn is_deep(bytes: &[u8]) -> bool {
-    upright(bytes, Tones::Colours).is_ok_and(|image| {
+    upright(bytes, Wanted::Colours).is_ok_and(|image| {
         let colour = image.color();
         colour.bytes_per_pixel() > colour.channel_count()
     })
@@ -79,14 +81,14 @@ pub fn is_deep(bytes: &[u8]) -> bool {
 
 /// What is wanted of an image.
 #[derive(Clone, Copy, PartialEq)]
-enum Tones {
+enum Wanted {
     /// Its luma.
     Grey,
     Colours,
 }
 
 /// The decoded image, set upright.
-fn upright(bytes: &[u8], tones: Tones) -> Result<DynamicImage, FormatError> {
+fn upright(bytes: &[u8], tones: Wanted) -> Result<DynamicImage, FormatError> {
     if bytes.is_empty() {
         return Err(FormatError::Empty);
     }

@@ -25,7 +25,8 @@ const FORMAT: u32 = 4;
 pub struct State<'a> {
     /// Number of steps done.
     pub step: u64,
-    /// Anything but large arrays. JSON has no NaN and no infinity: what may become either belongs in an array.
+    /// Anything but large arrays, nested by at most 200 levels: more could not be read back. JSON has no NaN and no infinity: what may become
+    /// either belongs in an array.
     pub notes: Value,
     /// Named arrays, stored bit by bit.
     pub arrays: BTreeMap<String, Array<'a>>,

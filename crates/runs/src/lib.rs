@@ -52,7 +52,7 @@
 //!   often it was stopped: only the last checkpoint stays.
 //! - A bit that has flipped in one of those files is noticed when the run is opened, and the file named.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - Readers never trust a number in a file before its length agrees. They take about three times the length of a checkpoint with
+//! - Readers never trust a number in a file before its length agrees. They take up to four times the length of a checkpoint with
 //!   large arrays, and at most 320 times that of its notes (small maps).
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 //!

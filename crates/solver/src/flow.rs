@@ -1,4 +1,4 @@
-//! Willmore flow and mean curvature flow, step by step, with a record of each.
+//! Willmore flow, step by step, with a record of each, and mean curvature flow.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -334,17 +334,23 @@ impl<const D: usize> WillmoreFlow<D> {
         ];
         for field in fields.into_iter().flatten() {
             self.grid.same_as(field.grid())?;
+            let (expected, actual) = (field.nodes().len(), field.values().len());
+            if expected != actual {
+                return Err(geometry::Error::ValueCount { expected, actual }.into());
+            }
             field
                 .check_finite()
                 .map_err(|_| Error::non_finite(state.step, "phase field"))?;
+            if let (Some(active), Some(bricks)) = (&self.active, field.nodes().bricks()) {
+                let [cells, side] = [bricks.cells(), bricks.side()];
+                if [cells, side] != [self.grid.cells(), active.bricks.side()] {
+                    return Err(geometry::Error::Bricks { cells, side }.into());
+                }
+            }
         }
         self.set_half_motions(&state.half_motions)?;
         if let Some(active) = &self.active {
             let next = match state.current.nodes().bricks() {
-                Some(bricks) if bricks.side() != active.bricks.side() => {
-                    let [cells, side] = [bricks.cells(), bricks.side()];
-                    return Err(geometry::Error::Bricks { cells, side }.into());
-                }
                 Some(bricks) => active.at(bricks.clone()),
                 None => active.following_field(&state.current)?,
             };
@@ -384,7 +390,8 @@ impl<const D: usize> WillmoreFlow<D> {
     /// One step of size `tau`.
     ///
     /// # Errors
-    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`]; the flow stays where it was.
+    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`]; the flow stays where it was. In the first step, what tracing the energy
+    /// raises.
     pub fn advance(&mut self, tau: f64) -> Result<StepRecord, Error> {
         let half_motions = self.half_motions();
         let made = self.make_step(tau);
@@ -398,15 +405,22 @@ impl<const D: usize> WillmoreFlow<D> {
     /// [`Self::stored_field`].
     ///
     /// # Errors
-    /// [`Error::Step`] if the step's own solver fails; the flow stays where it was.
+    /// [`Error::Step`] if the step's own solver fails; the flow stays where it was. [`Error::NeedsGrid`] on active bricks.
     pub fn advance_by_mean_curvature(&mut self) -> Result<(), Error> {
+        if self.active.is_some() {
+            let what = "mean curvature flows";
+            return Err(Error::NeedsGrid { what });
+        }
         let next = self.mcf.apply(self.current.clone());
         if let Some(failure) = self.mcf.failure() {
             return Err(Error::Step(failure));
         }
-        self.current = next;
+        self.current = Region::hold(self.region.as_ref(), next, &self.current);
+        // Steps of Willmore flow do not go on from this one.
+        self.set_half_motions(&[])?;
+        (self.previous, self.rate) = (None, None);
         self.step += 1;
-        self.time = self.step as f64 * self.params.mcf_step;
+        self.time += self.params.mcf_step;
         Ok(())
     }
 

@@ -9,8 +9,8 @@ const NONE: u32 = u32::MAX;
 
 /// A closed oriented surface of triangles. Half-edges `3 f`, `3 f + 1` and `3 f + 2` are the sides of the face `f`, in order.
 ///
-/// The operations keep the surface a manifold, its components and its Euler characteristic, as long as
-/// [`can_flip`](Self::can_flip) and [`can_collapse`](Self::can_collapse) are asked before.
+/// The operations are for surfaces that run once around every vertex. They keep them manifolds, their components and their Euler characteristic,
+/// as long as [`can_flip`](Self::can_flip) and [`can_collapse`](Self::can_collapse) are asked before.
 pub(crate) struct HalfEdges {
     /// The vertex from which a half-edge starts.
     origin: Vec<u32>,

@@ -9,7 +9,7 @@ use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{Tones, checked};
+use super::{Wanted, checked};
 use crate::FormatError;
 
 /// Progressive files have some ten scans; each takes time for the whole image.
@@ -17,7 +17,7 @@ const MOST_SCANS: usize = 64;
 
 pub(super) fn decode(
     bytes: &[u8],
-    tones: Tones,
+    tones: Wanted,
 ) -> Result<(DynamicImage, Option<Orientation>), FormatError> {
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
@@ -31,7 +31,7 @@ pub(super) fn decode(
     let count = checked([width, height])?;
     let (output, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
-        Some(ColorSpace::YCbCr) if tones == Tones::Grey => (ColorSpace::Luma, 1),
+        Some(ColorSpace::YCbCr) if tones == Wanted::Grey => (ColorSpace::Luma, 1),
         Some(ColorSpace::YCbCr | ColorSpace::RGB | ColorSpace::CMYK | ColorSpace::YCCK) => {
             (ColorSpace::RGB, 3)
         }

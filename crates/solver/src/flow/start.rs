@@ -45,9 +45,7 @@ impl<const D: usize> WillmoreFlow<D> {
             let what = "starts on half grids";
             return Err(Error::NeedsGrid { what });
         }
-        // The other grid's size and place are in the error.
-        Field::constant(self.grid.half()?, 0.0)
-            .zip_map(&Field::constant(half.grid, 0.0), |a, _| a)?;
+        self.grid.half()?.same_as(&half.grid)?;
         for (name, own, other) in [
             ("eps of the half grid", self.params.eps, half.params.eps),
             (
