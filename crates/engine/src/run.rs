@@ -127,27 +127,18 @@ impl<const D: usize> Run<D> {
 
     /// A step that succeeds and is short enough. Its record lacks what the phase field says: measures, distances and whether a step is complete.
     fn attempt(&mut self) -> Result<Record, Error> {
-        let (mut size, mut most) = (self.control.next_size(), self.control.halvings());
+        let (mut size, mut halvings) = self.first_size();
         let halvings_of_motion = self.control.halvings_of_motion();
+        let mut most = self.control.halvings();
         if !self.case.held.is_empty() {
             most = most.max(halvings_of_motion);
         }
-        let (mut halvings, mut refused_hvp) = (0, 0.0);
-        let (order, longest) = (self.case.steps.order, self.case.steps.longest_move);
         // Where it is before the step, for trying that again.
-        let before = match longest {
+        let before = match self.case.steps.longest_move {
             Some(longest) => Some((longest, self.state()?)),
             None => None,
         };
-        // What was too long for the last step is not tried again at once.
-        let last = self.records.last().filter(|_| longest.is_some());
-        if let Some(last) = last.filter(|last| last.halvings > 0) {
-            let longer = if last.far { 1.5 } else { 2.0 };
-            while size > longer * last.tau && halvings < halvings_of_motion {
-                size *= 0.5;
-                halvings += 1;
-            }
-        }
+        let mut refused_hvp = 0.0;
         loop {
             let mut shorter = None;
             let accept = &mut |made: &StepRecord| {
@@ -156,7 +147,7 @@ impl<const D: usize> Run<D> {
             };
             // A shorter step changes what is held by less, too.
             let gone = self.control.steps_gone + size / self.control.step_size();
-            let constraints = self.case.held.at(gone);
+            let (order, constraints) = (self.case.steps.order, self.case.held.at(gone));
             let refused = match self.motion.advance(size, order, constraints, accept) {
                 Ok((minimization, true)) => {
                     self.torn = true;
@@ -166,21 +157,15 @@ impl<const D: usize> Run<D> {
                         None => 0.0,
                     };
                     let too_far = part > 1.0 && halvings < halvings_of_motion;
-                    let Some((_, state)) = before.as_ref().filter(|_| too_far) else {
-                        let mcf_step = self.case.scales.mcf_step;
-                        let count = self.records.len() + 1;
+                    let Some((_, before)) = before.as_ref().filter(|_| too_far) else {
                         return Ok(Record {
-                            step: self.control.step(),
-                            time: minimization.map_or(count as f64 * mcf_step, |made| made.time),
-                            tau: minimization.map_or(mcf_step, |made| made.tau),
                             halvings,
                             far: part > FAR,
                             refused_hvp,
-                            minimization,
-                            ..Record::default()
+                            ..self.record(minimization)
                         });
                     };
-                    let restored = self.motion.restore(state);
+                    let restored = self.motion.restore(before);
                     restored.map_err(|source| self.failed(source))?;
                     self.torn = false;
                     minimization
@@ -203,6 +188,36 @@ impl<const D: usize> Run<D> {
             refused_hvp += refused.map_or(0.0, |made| made.hvp());
             size = shorter.unwrap_or(0.5 * size);
             halvings += 1;
+        }
+    }
+
+    /// The size with which a step is tried first, and how often it is halved: what was too long for the last step is not tried again at once.
+    fn first_size(&self) -> (f64, u32) {
+        let (mut size, mut halvings) = (self.control.next_size(), 0);
+        let is_limited = self.case.steps.longest_move.is_some();
+        let last = self
+            .records
+            .last()
+            .filter(|last| is_limited && last.halvings > 0);
+        if let Some(last) = last {
+            let longer = if last.far { 1.5 } else { 2.0 };
+            while size > longer * last.tau && halvings < self.control.halvings_of_motion() {
+                size *= 0.5;
+                halvings += 1;
+            }
+        }
+        (size, halvings)
+    }
+
+    /// The place in the time steps of a minimization that was just made, or of a step of mean curvature flow.
+    fn record(&self, minimization: Option<StepRecord>) -> Record {
+        let (mcf_step, count) = (self.case.scales.mcf_step, self.records.len() + 1);
+        Record {
+            step: self.control.step(),
+            time: minimization.map_or(count as f64 * mcf_step, |made| made.time),
+            tau: minimization.map_or(mcf_step, |made| made.tau),
+            minimization,
+            ..Record::default()
         }
     }
 
