@@ -272,7 +272,8 @@ impl<'a> Reader<'a> {
             );
         }
         if let Some((device, flow)) = self.whole {
-            Storage::check(device, flow, &grid, grid.len(), flow == Flow::Willmore)?;
+            let needed = (grid.len(), Storage::bytes(flow, grid.len(), grid.len()));
+            Storage::check(device, &grid, needed, flow == Flow::Willmore)?;
         }
         Ok(grid)
     }

@@ -25,7 +25,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-use crate::cli::{Cli, Command};
+use crate::cli::{Cli, Command, write_out};
 use crate::commands::{about, check, flow, resume, sample, train};
 use crate::prelude::*;
 use crate::standard::Standard;
@@ -35,13 +35,12 @@ const FAILURE: u8 = 2;
 fn main() -> ExitCode {
     operators::memory::keep_freed();
     let arguments: Vec<OsString> = std::env::args_os().collect();
-    match config::parse(&arguments).and_then(execute) {
+    let done = match config::parse(&arguments).and_then(execute) {
+        Err(Error::Help(help)) => write_out(help.to_string().as_bytes()),
+        done => done,
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Error::Help(help)) => {
-            // A closed pipe (`| head`) is no failure.
-            let _ = help.print();
-            ExitCode::SUCCESS
-        }
         Err(Error::Interrupted | Error::Model(model::Error::Interrupted { .. })) => {
             ExitCode::from(Interrupt::EXIT_CODE)
         }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::time::Instant;
 
-use engine::{Checkpoints, Event, Observer, Storage, Store, estimated_time_error};
+use engine::{Checkpoints, Event, Observer, Store, estimated_time_error};
 use files::Storage as _;
 use geometry::measure::touches_side;
 use solver::StepEstimates;
@@ -63,7 +63,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
         } else {
             "the whole grid".to_owned()
         };
-        let gigabytes = 1e-9 * Storage::bytes(run.case().flow, nodes, stored);
+        let gigabytes = 1e-9 * run.case().bytes(stored);
         self.messages.note(&format!(
             "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
         ));

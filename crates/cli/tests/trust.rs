@@ -410,7 +410,7 @@ fn a_finished_run_goes_on_to_more_steps() {
     let saved = folder.path().join("cross.png");
     let before = fs::read(&saved).unwrap();
     let line = refused(folder.path(), &["resume", "run", "--steps", "3"]);
-    assert!(line.contains("cannot go on: 3 steps are made"), "{line}");
+    assert!(line.contains("cannot go on: 4 steps are made"), "{line}");
     let more = outcome(folder.path(), &["resume", "run", "--steps", "8"]);
     assert_eq!(more["steps"], 8, "{more}");
     assert_ne!(fs::read(&saved).unwrap(), before);

@@ -101,14 +101,15 @@ pub(crate) fn of<const D: usize>(
     let takes_bricks = needs_grid.is_none();
     let whole = !takes_bricks || storage == Storage::Dense;
     if whole {
-        Storage::check(kind, case.flow, grid, grid.len(), takes_bricks)?;
+        let nodes = grid.len();
+        Storage::check(kind, grid, (nodes, case.bytes(nodes)), takes_bricks)?;
     }
     let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
     let made = make.expect("a case is in the plane or in space")(case, state, device)?;
     if !whole {
         // How many cells are stored is known only now; little is allocated yet.
         let stored = made.0.stored_cells();
-        Storage::check(kind, case.flow, grid, stored, true)?;
+        Storage::check(kind, grid, (stored, case.bytes(stored)), true)?;
     }
     Ok(made)
 }
@@ -162,8 +163,9 @@ fn learned<const D: usize>(
     let bricks = || WillmoreFlow::on_bricks(network, initial, params, device);
     // Where bricks are no alternative.
     let dense_instead = || -> Result<_, Error> {
-        let grid = case.grid();
-        Storage::check(device.kind(), case.flow, grid, grid.len(), false)?;
+        let nodes = case.grid().len();
+        let needed = (nodes, case.bytes(nodes));
+        Storage::check(device.kind(), case.grid(), needed, false)?;
         Ok(dense()?)
     };
     if case.flow == Flow::MeanCurvature {

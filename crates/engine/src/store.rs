@@ -106,6 +106,10 @@ impl Store {
         }
         let run = restore(&stored, case, device, &["stops"])?;
         if let Some(stop) = run.ended() {
+            let stop = match stop {
+                Stop::Steps(_) => Stop::Steps(run.steps()),
+                stop => stop,
+            };
             return Err(refused(&stored, stop.to_string()));
         }
         let is_gone = |name: &str| name == METRICS || ends(name);
