@@ -9,15 +9,11 @@ use operators::ComputeDevice;
 use serde_json::{Value, json};
 use solver::FlowParams;
 
+use crate::storage::{PER_HELD, PER_NODE_OF_ELEMENTS};
 use crate::{
     Current, Error, Flow, Held, Helfrich, Measure, Method, Operator, Scales, Stop, Storage,
     TimeSteps,
 };
-
-/// Bytes for each node that implicit finite elements take more than other steps of mean curvature flow, measured at 96 and 144 cells,
-const PER_NODE_OF_ELEMENTS: f64 = 300.0;
-/// and for each size that is held, on the whole grid (64 and 96 cells) and for each cell on bricks (128).
-const PER_HELD: [f64; 2] = [185.0, 100.0];
 
 /// A flow with everything that its result depends on, but for the device.
 #[derive(Clone, Debug)]

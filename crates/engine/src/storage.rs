@@ -26,6 +26,10 @@ pub enum Storage {
 const PER_NODE: f64 = 300.0;
 /// and of mean curvature flow, measured at 96 and 144 (157).
 const PER_NODE_OF_MCF: f64 = 160.0;
+/// Bytes for each node that implicit finite elements take more than other steps of mean curvature flow, measured at 96 and 144 cells,
+pub(crate) const PER_NODE_OF_ELEMENTS: f64 = 300.0;
+/// and for each size that is held, on the whole grid (64 and 96 cells) and for each cell on bricks (128).
+pub(crate) const PER_HELD: [f64; 2] = [185.0, 100.0];
 /// Bytes for each stored cell of a flow on bricks, measured with the armadillo at 256 and 512 cells (329 and 317).
 const PER_CELL: f64 = 330.0;
 

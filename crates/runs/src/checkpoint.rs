@@ -17,6 +17,8 @@ use crate::{Error, names};
 const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
 /// Bumped when a reader of the old format would misread the new one.
 const FORMAT: u32 = 4;
+/// Notes that are nested more deeply could not be read back.
+const DEEPEST: usize = 200;
 
 /// What a run goes on from: all that the caller needs, so that the next step has the same bits as
 /// without an interruption.
@@ -25,16 +27,22 @@ const FORMAT: u32 = 4;
 pub struct State<'a> {
     /// Number of steps done.
     pub step: u64,
-    /// Anything but large arrays, nested by at most 200 levels: more could not be read back. JSON has no NaN and no infinity: what may become
-    /// either belongs in an array.
+    /// Anything but large arrays, nested by at most 200 levels. JSON has no NaN and no infinity: what may become either belongs in an array.
     pub notes: Value,
     /// Named arrays, stored bit by bit.
     pub arrays: BTreeMap<String, Array<'a>>,
 }
 
-/// Values that are stored as bytes, little endian.
-#[derive(Debug, Clone, PartialEq)]
+/// Values that are stored as bytes, little endian, and equal if these are.
+#[derive(Debug, Clone)]
 pub struct Array<'a>(pub Cow<'a, [f64]>);
+
+impl PartialEq for Array<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |v: &f64| v.to_bits();
+        self.0.iter().map(bits).eq(other.0.iter().map(bits))
+    }
+}
 
 impl Serialize for Array<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -76,6 +84,28 @@ impl<'a> State<'a> {
     pub fn array(&self, name: &str) -> Option<&[f64]> {
         self.arrays.get(name).map(|array| &*array.0)
     }
+
+    pub(crate) fn refused(&self, reason: &str) -> Error {
+        let step = self.step;
+        Error::Invalid(format!("the state of step {step} cannot be used: {reason}"))
+    }
+
+    /// Refuses what could not be read back: better now than on the day of the restart.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if depth(&self.notes) > DEEPEST {
+            return Err(self.refused("its notes are nested too deeply"));
+        }
+        Ok(())
+    }
+}
+
+fn depth(notes: &Value) -> usize {
+    let inside = match notes {
+        Value::Array(items) => items.iter().map(depth).max(),
+        Value::Object(entries) => entries.values().map(depth).max(),
+        _ => return 0,
+    };
+    1 + inside.unwrap_or(0)
 }
 
 /// The files of a run, apart from those that it makes itself, with the seals of those that never change.

@@ -48,6 +48,7 @@ impl RunDirectory {
         state: &State<'_>,
     ) -> Result<Self, Error> {
         let path = path.into();
+        state.check()?;
         let mut own = Files::new();
         for &(name, _) in files {
             names::check(name)?;
@@ -132,7 +133,7 @@ impl RunDirectory {
     /// Makes all that was written so far, and this state, what the run is resumed from. The last two
     /// checkpoints are kept.
     ///
-    /// The last step may be committed again, for example on an interruption right after a commit.
+    /// The same state may be committed again, for example on an interruption right after a commit.
     /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
     /// on or be opened again.
     pub fn commit(&mut self, state: &State<'_>) -> Result<(), Error> {
@@ -147,10 +148,11 @@ impl RunDirectory {
     }
 
     fn commit_as(&mut self, state: &State<'_>, finished: bool) -> Result<(), Error> {
+        state.check()?;
         let (last, step) = (self.steps.first().copied(), state.step);
-        if last > Some(step) {
-            let reason = format!("the state of step {step} cannot be committed: a later one is");
-            return Err(Error::Invalid(reason));
+        let repeats = || checkpoint::read(&self.path, step).map(|(.., old)| old == *state);
+        if last > Some(step) || last == Some(step) && !repeats()? {
+            return Err(state.refused("a commit is of a later step than the last, or repeats it"));
         }
         let path = self.path.join(names::checkpoint(step));
         files::write_atomically_on(&*self.storage, path, |out| {

@@ -357,6 +357,9 @@ fn a_run_is_not_started_over_anything() {
 fn misuse_is_refused_and_changes_nothing() {
     let folder = quick_folder();
     let path = folder.path().join("run");
+    let deep = (0..250).fold(json!(0), |inner, _| json!([inner]));
+    let refused = RunDirectory::create(&path, &[], &State::new(0, deep.clone()));
+    assert!(refused.unwrap_err().to_string().contains("deeply"));
     let refused = RunDirectory::create(&path, &[("../a", b"")], &toy::state_at(0));
     assert!(matches!(refused, Err(Error::Invalid(_))));
     assert!(!path.exists());
@@ -378,14 +381,28 @@ fn misuse_is_refused_and_changes_nothing() {
     assert!(matches!(run.write_file("a/b", b""), Err(Error::Invalid(_))));
     assert!(run.replace_file("a/b", b"").is_err());
 
+    let unusable = |state: &State, run: &mut RunDirectory, reason: &str| {
+        let message = run.commit(state).unwrap_err().to_string();
+        assert!(message.contains(reason), "{message}");
+    };
+    unusable(&State::new(1, deep), &mut run, "deeply");
+    // Two hundred levels are read back.
+    let nested = (0..200).fold(json!(0), |inner, _| json!([inner]));
+    run.commit(&State::new(1, nested.clone())).unwrap();
+    drop(run);
+    let (mut run, kept) = RunDirectory::open(&path).unwrap().resume().unwrap();
+    assert_eq!(kept.notes, nested);
     let state = |step| State::new(step, json!(0.1 + 0.2));
     // Bits, not numbers.
     let odd = vec![f64::NAN, -0.0, f64::NEG_INFINITY, f64::from_bits(1)];
     let fourth = state(4).with_array("odd", odd.clone());
     run.commit(&fourth).unwrap();
     run.commit(&fourth).unwrap();
-    let message = run.commit(&state(3)).unwrap_err().to_string();
-    assert!(message.contains("step 3"), "{message}");
+    unusable(&state(4), &mut run, "step 4");
+    let other = state(4).with_array("odd", vec![0.0; 4]);
+    unusable(&other, &mut run, "step 4");
+    unusable(&State::new(4, json!(0)), &mut run, "step 4");
+    unusable(&state(3), &mut run, "step 3");
     run.commit(&state(5).with_array("odd", odd.clone()))
         .unwrap();
     drop(run);

@@ -44,11 +44,11 @@ impl FairOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
-        let mut reader = self.flow.run.reader(messages)?;
+    pub fn load(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Loaded> {
+        let mut reader = self.flow.run.reader(device, messages)?;
         reader.allows_loss = Some(self.allow_loss);
         let loaded = match reader.source.clone() {
-            Source::Mesh(path) => return self.load_mesh(&path, messages),
+            Source::Mesh(path) => return self.load_mesh(&path, device, messages),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
                 let given = self.noise.map_or("--keep", |_| "--noise");
                 refuse!(
@@ -86,7 +86,12 @@ impl FairOptions {
         Ok(loaded)
     }
 
-    fn load_mesh(&mut self, path: &Path, messages: MessageOptions) -> Result<Loaded> {
+    fn load_mesh(
+        &mut self,
+        path: &Path,
+        device: DeviceKind,
+        messages: MessageOptions,
+    ) -> Result<Loaded> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             refuse!(
@@ -144,7 +149,7 @@ impl FairOptions {
             }
             self.noise = Some(noise);
         }
-        let mut reader = self.flow.run.reader(messages)?;
+        let mut reader = self.flow.run.reader(device, messages)?;
         reader.allows_loss = Some(self.allow_loss);
         reader.own(own, path)
     }

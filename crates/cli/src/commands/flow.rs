@@ -54,18 +54,11 @@ impl RunCommand {
 }
 
 impl RunOptions {
-    /// Reads the input.
-    pub fn reader(&mut self, messages: MessageOptions) -> Result<Reader<'_>> {
+    /// Reads the input, for Willmore flow on a device.
+    pub fn reader(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Reader<'_>> {
         let mut reader = Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)?;
-        let device = self
-            .common
-            .device
-            .as_deref()
-            .and_then(|name| name.parse().ok());
         let is_dense = self.scheme.storage == Some(Storage::Dense);
-        reader.whole = device
-            .filter(|_| is_dense)
-            .map(|device| (device, Flow::Willmore));
+        reader.whole = is_dense.then_some((device, Flow::Willmore));
         Ok(reader)
     }
 }
@@ -130,15 +123,16 @@ pub fn run(
             _ => job.resume::<3, Space>(stored, more),
         };
     }
+    let kind = job.device.kind();
     let loaded = match &mut job.command {
-        RunCommand::Fair(fair) => fair.load(messages),
-        RunCommand::Inpaint(inpaint) => inpaint.load(messages),
+        RunCommand::Fair(fair) => fair.load(kind, messages),
+        RunCommand::Inpaint(inpaint) => inpaint.load(kind, messages),
         RunCommand::Mcf(mcf) => {
-            let mut reader = mcf.run.reader(messages)?;
-            reader.whole = Some((job.device.kind(), Flow::MeanCurvature));
+            let mut reader = mcf.run.reader(kind, messages)?;
+            reader.whole = Some((kind, Flow::MeanCurvature));
             reader.load()
         }
-        RunCommand::Flow(flow) => flow.run.reader(messages)?.load(),
+        RunCommand::Flow(flow) => flow.run.reader(kind, messages)?.load(),
     };
     match loaded? {
         Loaded::Plane(start) => job.start(start),

@@ -16,8 +16,8 @@ impl InpaintOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, messages: MessageOptions) -> Result<Loaded> {
-        let loaded = self.flow.run.reader(messages)?.load()?;
+    pub fn load(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Loaded> {
+        let loaded = self.flow.run.reader(device, messages)?.load()?;
         let mask = self.mask.as_deref().unwrap_or_default();
         Ok(match loaded {
             Loaded::Plane(mut start) => {
