@@ -25,7 +25,7 @@ impl<const D: usize> Run<D> {
                 return Ok(Some(stop));
             }
             if let Err(error) = self.step() {
-                if let Some(store) = store.filter(|_| !self.torn) {
+                if let Some(store) = store {
                     // What the step says is told, and the checkpoints before this one are there.
                     let _ = store.commit(self, true);
                 }

@@ -47,7 +47,7 @@ const LEAST: f64 = 0.1;
 
 /// The size of the next controlled step. It depends on nothing but the records so far.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Controller {
+pub(crate) struct Sizes {
     control: ErrorControl,
     eps: f64,
     largest: f64,
@@ -55,7 +55,7 @@ pub(crate) struct Controller {
     time: f64,
 }
 
-impl Controller {
+impl Sizes {
     pub(crate) fn new(control: ErrorControl, eps: f64, largest: f64) -> Result<Self, Error> {
         let size = control.first.unwrap_or(16.0 * eps.powi(4));
         positive("relative error of a step", control.relative)?;
@@ -141,8 +141,8 @@ mod tests {
 
     const EPS: f64 = 0.1;
 
-    fn controller() -> Controller {
-        Controller::new(ErrorControl::default(), EPS, 1.0).unwrap()
+    fn controller() -> Sizes {
+        Sizes::new(ErrorControl::default(), EPS, 1.0).unwrap()
     }
 
     fn made(tau: f64, error: Option<f64>, displacement: f64) -> Record {
@@ -180,7 +180,7 @@ mod tests {
             length: Some(1e-4),
             ..ErrorControl::default()
         };
-        let mut control = Controller::new(control, EPS, 1.0).unwrap();
+        let mut control = Sizes::new(control, EPS, 1.0).unwrap();
         // The step is the last quarter of the time.
         let allowed = 0.25 * 1e-4 / ESTIMATES_MISS;
         control.accept(&made(1e-3, Some(allowed), 0.01 * EPS));
@@ -222,7 +222,7 @@ mod tests {
                 relative,
                 ..ErrorControl::default()
             };
-            let error = Controller::new(control, EPS, 1.0).unwrap_err();
+            let error = Sizes::new(control, EPS, 1.0).unwrap_err();
             assert!(matches!(error, Error::Geometry(_)), "{error}");
         }
     }

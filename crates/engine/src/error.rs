@@ -7,19 +7,8 @@ use thiserror::Error as ThisError;
 /// What can stop a case.
 #[derive(Debug, ThisError)]
 pub enum Error {
-    #[error(
-        "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
-    )]
-    ReducedVolume { target: f64, present: f64 },
-    #[error(
-        "no shape in the box with the volume {volume:.5e} has less surface than {perimeter:.5e}, so that nothing could move (in the plane, length and \
-         area): hold one of the two sizes, or more surface for this volume (a smaller reduced volume)"
-    )]
-    LeastPerimeter { perimeter: f64, volume: f64 },
-    #[error(
-        "{case}: the step before failed after the flow had moved: go on from the last checkpoint"
-    )]
-    Torn { case: String },
+    #[error("{case}: step {step}: the controller gave up at a step of size {tau:.1e}")]
+    Refused { case: String, step: usize, tau: f64 },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {

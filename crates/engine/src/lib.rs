@@ -46,15 +46,15 @@
 mod advance;
 mod case;
 mod control;
+mod controller;
 mod current;
 mod edges;
 mod error;
 mod flow;
-mod held;
 mod measure;
-mod motion;
 mod observer;
 mod operator;
+mod parts;
 mod record;
 mod run;
 mod step_control;
@@ -67,11 +67,11 @@ mod trajectory;
 
 pub use case::Case;
 pub use control::ErrorControl;
+pub use controller::{Attempts, Controller, EqualSteps, Verdict};
 pub use current::Current;
 pub use edges::round_edges;
 pub use error::Error;
 pub use flow::Flow;
-pub use held::{Held, Target};
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Method, Operator, Scales, Scheme, quarter_square};
@@ -79,7 +79,8 @@ pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, total_hvp,
 };
 pub use run::Run;
-pub use solver::Helfrich;
+pub use solver::{Held, Helfrich, Target};
+pub use step_control::StepControl;
 pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::Stop;
 pub use storage::Storage;

@@ -19,6 +19,8 @@ pub struct Record {
     pub time: f64,
     /// Step size.
     pub tau: f64,
+    /// Size of the time step to which it belongs.
+    pub step_size: f64,
     /// How often it was halved: because the minimization failed, because a controlled step was too long, or because the interface moved too
     /// far, now or in the step before.
     pub halvings: u32,

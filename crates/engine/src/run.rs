@@ -4,34 +4,34 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use fem::FiniteElementStep;
-use geometry::measure::{has_interface, l2_distance};
+use geometry::measure::l2_distance;
 use geometry::{Field, NodeSet, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
-use solver::{FlowState, StepRecord, widths_between};
+use solver::{Candidate, Problem, Scheme, State, StepSize};
 
-use crate::motion::{self, Motion};
+use crate::parts::{self, Parts};
 use crate::record::Values;
 use crate::step_control::StepControl;
 use crate::stop::Progress;
-use crate::{Case, Current, Error, Flow, Measure, Record, Stop};
+use crate::{Attempts, Case, Controller, Current, Error, Flow, Measure, Record, Stop, Verdict};
 
-/// A case that is being computed: its flow, its place in the time steps, and the records so far.
+/// A case that is being computed: its problem, its state, what makes its steps and takes them, and the records so far.
 pub struct Run<const D: usize> {
     pub(crate) case: Case<D>,
     pub(crate) device: ComputeDevice,
     identity: OnceLock<Value>,
-    motion: Box<dyn Motion<D>>,
+    problem: Problem<D>,
+    scheme: Box<dyn Scheme<D>>,
+    controller: Box<dyn Controller<D>>,
+    pub(crate) state: State<D>,
     elements: Option<FiniteElementStep<D>>,
-    control: StepControl,
-    /// What is stored of the phase field after the last step; nothing before the first one.
+    /// The phase field of the state on the host; nothing before the first step.
     stored: Option<Stored<D>>,
     /// The same on the whole grid, once it was asked for.
     whole: OnceLock<Field<D>>,
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
-    /// Whether a step failed after the flow had moved, so that it is not where the last record says.
-    pub(crate) torn: bool,
     ended: Option<Stop>,
 }
 
@@ -45,16 +45,15 @@ impl<const D: usize> Run<D> {
         let whole = OnceLock::new();
         let initial = case.current(&case.initial, &whole);
         let start = Measure::values(&case.measures, &initial, 0.0)?;
-        Self::at(case, device, start, Vec::new(), None)
+        Self::at(case, device, start, Vec::new())
     }
 
-    /// A case at the state that it had after these records, or at its start.
+    /// A case at its start, with the records of what was made of it: the [state](Self::go_to) that belongs to them is restored afterwards.
     pub(crate) fn at(
         case: Case<D>,
         device: &ComputeDevice,
         start: Values,
         records: Vec<Record>,
-        state: Option<&FlowState<D>>,
     ) -> Result<Self, Error> {
         let (mcf_step, first) = (case.scales.mcf_step, case.steps.rule.size(1));
         if case.flow == Flow::MeanCurvature {
@@ -70,165 +69,129 @@ impl<const D: usize> Run<D> {
                 |n| n < 1.0,
             )?;
         }
-        let mut control = StepControl::new(&case)?;
+        let mut controller: Box<dyn Controller<D>> = Box::new(StepControl::new(&case)?);
         for record in &records {
-            control.accept(record)?;
+            controller.accept(record)?;
         }
-        let (motion, elements) = motion::of(&case, state, device)?;
-        // Before the first step all of the initial values count, also where they are not stored.
-        let begun = !records.is_empty();
-        let stored = begun.then(|| motion.stored()).transpose()?;
+        let Parts {
+            problem,
+            start: state,
+            scheme,
+            elements,
+        } = parts::of(&case, device)?;
         let mut run = Self {
-            motion,
+            problem,
+            scheme,
+            state,
             elements,
             device: device.clone(),
             identity: OnceLock::new(),
-            stored,
+            stored: None,
             whole: OnceLock::new(),
             case,
-            control,
+            controller,
             start,
             records,
-            torn: false,
             ended: None,
         };
-        run.ended = run.stop();
+        if run.records.is_empty() {
+            // Before the first step all of the initial values count, also where they are not stored.
+            run.ended = run.stop();
+        }
         Ok(run)
     }
 
-    /// Makes one step: a minimization of the next size, halved if it fails and the rule allows that. None once a stop rule holds.
+    /// Goes to the state that belongs to the records.
+    pub(crate) fn go_to(&mut self, state: State<D>) -> Result<(), Error> {
+        if !self.records.is_empty() {
+            self.stored = Some(state.stored()?);
+            self.whole.take();
+        }
+        self.state = state;
+        self.ended = self.stop();
+        Ok(())
+    }
+
+    /// Makes one step: of the next size, or of a smaller one if the controller does not take that. None once a stop rule holds.
     ///
     /// # Errors
-    /// [`Error::Step`], [`Error::TooStiff`]: the run stays where it was. After errors of measures, or if what a step has made is not finite, it
-    /// goes on from its last checkpoint only, and further steps are [`Error::Torn`].
+    /// [`Error::Step`], [`Error::TooStiff`], and those of measures: the run stays where it was.
     pub fn step(&mut self) -> Result<Option<&Record>, Error> {
         if self.ended.is_some() {
             return Ok(None);
         }
-        if self.torn {
-            let case = self.case.title();
-            return Err(Error::Torn { case });
-        }
         let clock = Instant::now();
-        self.whole.take();
-        let mut record = self.attempt()?;
-        let now = self.motion.stored().map_err(|source| self.failed(source))?;
+        let (candidate, mut record) = self.candidate()?;
+        let now = candidate
+            .state
+            .stored()
+            .map_err(|source| self.failed(source))?;
         record.moved = self.distance(&now, self.stored());
         record.travelled = self.distance(&now, &self.case.initial);
-        self.stored = Some(now);
         record.seconds = clock.elapsed().as_secs_f64();
-        record.measures = Measure::values(&self.case.measures, &self.current(), record.time)?;
-        record.completes_step = self.control.accept(&record)?;
+        let whole = OnceLock::new();
+        let seen = self.case.current(&now, &whole);
+        record.measures = Measure::values(&self.case.measures, &seen, record.time)?;
+        record.completes_step = self.controller.accept(&record)?;
+        self.state = candidate.state;
+        (self.stored, self.whole) = (Some(now), whole);
         self.records.push(record);
-        self.torn = false;
         self.ended = self.stop();
         Ok(self.records.last())
     }
 
-    /// A step that succeeds and is short enough. Its record lacks what the phase field says: measures, distances and whether a step is complete.
-    fn attempt(&mut self) -> Result<Record, Error> {
-        let (mut size, mut halvings) = self.first_size();
-        let halvings_of_motion = self.control.halvings_of_motion();
-        let mut most = self.control.halvings();
-        if !self.case.held.is_empty() {
-            most = most.max(halvings_of_motion);
-        }
-        // Where it is before the step, for trying that again.
-        let before = match self.case.steps.longest_move {
-            Some(longest) => Some((longest, self.state()?)),
-            None => None,
-        };
-        let mut refused_hvp = 0.0;
+    /// A step that the controller takes, and its record without what the phase field says.
+    fn candidate(&mut self) -> Result<(Candidate<D>, Record), Error> {
         loop {
-            let mut shorter = None;
-            let accept = &mut |made: &StepRecord| {
-                shorter = self.control.shorter(made).filter(|_| halvings < most);
-                shorter.is_none()
-            };
-            // A shorter step changes what is held by less, too.
-            let gone = self.control.steps_gone + size / self.control.step_size();
-            let (order, constraints) = (self.case.steps.order, self.case.held.at(gone));
-            let refused = match self.motion.advance(size, order, constraints, accept) {
-                Ok((minimization, true)) => {
-                    self.torn = true;
-                    // How far it has gone over how far it may go.
-                    let part = match &before {
-                        Some((longest, before)) => self.has_gone(&before.current)? / longest,
-                        None => 0.0,
-                    };
-                    let too_far = part > 1.0 && halvings < halvings_of_motion;
-                    let Some((_, before)) = before.as_ref().filter(|_| too_far) else {
-                        return Ok(Record {
-                            halvings,
-                            far: part > FAR,
-                            refused_hvp,
-                            ..self.record(minimization)
-                        });
-                    };
-                    let restored = self.motion.restore(before);
-                    restored.map_err(|source| self.failed(source))?;
-                    self.torn = false;
-                    minimization
+            let size = self.controller.next();
+            let made = self.scheme.step(&self.problem, &self.state, size);
+            let verdict = self.controller.judge(&self.state, made.as_ref());
+            match (verdict.map_err(|source| self.failed(source))?, made) {
+                (Verdict::Accept(attempts), Ok(candidate)) => {
+                    let record = self.record(&candidate, size, attempts);
+                    return Ok((candidate, record));
                 }
-                Ok((minimization, false)) => minimization,
-                Err(source) if most == 0 || !source.shorter_step_may_succeed() => {
-                    return Err(self.failed(source));
-                }
-                Err(_) if halvings < most => None,
-                Err(source) => {
+                (Verdict::GiveUp { halvings }, Err(source)) if halvings > 0 => {
                     return Err(Error::TooStiff {
                         case: self.case.title(),
-                        step: self.control.step(),
-                        tau: size,
+                        step: self.steps() + 1,
+                        tau: size.tau,
                         halvings,
                         source: Box::new(source),
                     });
                 }
-            };
-            refused_hvp += refused.map_or(0.0, |made| made.hvp());
-            size = shorter.unwrap_or(0.5 * size);
-            halvings += 1;
-        }
-    }
-
-    /// The size with which a step is tried first, and how often it is halved: what was too long for the last step is not tried again at once.
-    fn first_size(&self) -> (f64, u32) {
-        let (mut size, mut halvings) = (self.control.next_size(), 0);
-        let is_limited = self.case.steps.longest_move.is_some();
-        let last = self
-            .records
-            .last()
-            .filter(|last| is_limited && last.halvings > 0);
-        if let Some(last) = last {
-            let longer = if last.far { 1.5 } else { 2.0 };
-            while size > longer * last.tau && halvings < self.control.halvings_of_motion() {
-                size *= 0.5;
-                halvings += 1;
+                (Verdict::Accept(_) | Verdict::GiveUp { .. }, Err(source)) => {
+                    return Err(self.failed(source));
+                }
+                (Verdict::GiveUp { .. }, Ok(_)) => {
+                    let (case, step) = (self.case.title(), self.steps() + 1);
+                    let tau = size.tau;
+                    return Err(Error::Refused { case, step, tau });
+                }
+                (Verdict::Retry, _) => {}
             }
         }
-        (size, halvings)
     }
 
-    /// The place in the time steps of a minimization that was just made, or of a step of mean curvature flow.
-    fn record(&self, minimization: Option<StepRecord>) -> Record {
-        let (mcf_step, count) = (self.case.scales.mcf_step, self.records.len() + 1);
+    /// The place in the time steps of a step that was just made.
+    fn record(&self, candidate: &Candidate<D>, size: StepSize, attempts: Attempts) -> Record {
+        let Attempts {
+            halvings,
+            far,
+            refused_hvp,
+        } = attempts;
+        let (made, time) = (candidate.made, candidate.state.time);
         Record {
-            step: self.control.step(),
-            time: minimization.map_or(count as f64 * mcf_step, |made| made.time),
-            tau: minimization.map_or(mcf_step, |made| made.tau),
-            minimization,
+            step: self.steps() + 1,
+            time,
+            tau: made.map_or(size.tau, |made| made.tau),
+            step_size: size.whole,
+            halvings,
+            far,
+            refused_hvp,
+            minimization: made,
             ..Record::default()
         }
-    }
-
-    /// How many of its widths the interface has moved in the step that was just made, also to where there was none ([`widths_between`]); infinitely
-    /// many if it is away altogether.
-    fn has_gone(&self, before: &Stored<D>) -> Result<f64, Error> {
-        let now = self.motion.stored().map_err(|source| self.failed(source))?;
-        if !has_interface(&now) {
-            return Ok(f64::INFINITY);
-        }
-        Ok(widths_between(before, &now).max(widths_between(&now, before)))
     }
 
     fn failed(&self, source: solver::Error) -> Error {
@@ -246,10 +209,9 @@ impl<const D: usize> Run<D> {
             initial: &case.initial,
             current: self.current(),
             steps: self.steps(),
-            step_size: self.control.last_size,
             is_willmore: case.energy.is_willmore(),
         };
-        let driven = !case.held.is_reached(self.control.steps_gone);
+        let driven = !case.held.is_reached(self.state.progress);
         let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
         stops.find(|stop| stop.holds(&progress)).copied()
     }
@@ -303,7 +265,8 @@ impl<const D: usize> Run<D> {
 
     /// Number of completed time steps.
     pub fn steps(&self) -> usize {
-        self.control.step() - 1
+        let last = self.records.last();
+        last.map_or(0, |last| last.step - usize::from(!last.completes_step))
     }
 
     /// The present time.
@@ -313,18 +276,11 @@ impl<const D: usize> Run<D> {
 
     /// How many cells of the phase field are stored now: all of the grid, or those of the bricks near the surface.
     pub fn stored_cells(&self) -> usize {
-        self.motion.stored_cells()
+        self.state.field.nodes().len()
     }
 
     /// Work of the linear solves inside finite elements so far; none for a learned operator.
     pub fn statistics(&self) -> Option<fem::Statistics> {
         self.elements.as_ref().map(FiniteElementStep::statistics)
     }
-
-    pub(crate) fn state(&self) -> Result<FlowState<D>, Error> {
-        Ok(self.motion.state()?)
-    }
 }
-
-/// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
-const FAR: f64 = 0.6;

@@ -1,12 +1,15 @@
 //! Where in its time steps a flow is.
 
+use geometry::measure::has_interface;
 use geometry::positive;
-use solver::StepRecord;
+use solver::{Candidate, Error as StepError, State, StepRecord, StepSize, widths_between};
 
-use crate::control::Controller;
+use crate::control::Sizes;
 use crate::steps::{largest_step, least_energy};
 use crate::substeps::{EASY, HARD, Substeps};
-use crate::{Case, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps};
+use crate::{
+    Attempts, Case, Controller, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps, Verdict,
+};
 
 /// Steps by the energy grow while they take away less than this fraction of it,
 const LITTLE: f64 = 0.1;
@@ -16,11 +19,12 @@ const MUCH: f64 = 0.3;
 const HALVINGS: u32 = 24;
 /// How often a step is halved that moves the interface too far, or cannot hold what it is to hold.
 const HALVINGS_OF_MOTION: u32 = 12;
+/// A step that moves the interface this part of what it may is not followed by one of twice its size, which would be refused.
+const FAR: f64 = 0.6;
 
-/// Where in its time steps a flow is, and what size comes next. It depends on nothing but the records so far, so that
-/// [accepting](Self::accept) them again restores it.
+/// Steps by a [rule](StepRule) or by their [error](ErrorControl), as long as the interface [may move](TimeSteps::longest_move).
 #[derive(Clone, Debug)]
-pub(crate) struct StepControl {
+pub struct StepControl {
     steps: TimeSteps,
     /// The time at which the flow ends, if any.
     end: f64,
@@ -30,29 +34,51 @@ pub(crate) struct StepControl {
     /// Steps completed, and the time reached.
     completed: usize,
     time: f64,
-    /// Steps made, parts of them included, with which the targets of what is held move.
-    pub(crate) steps_gone: f64,
-    /// Size by the rule of the step to which the last record belongs; not a number before that.
-    pub(crate) last_size: f64,
     /// Size of the present step by the rule, and as far as it does not go beyond the end.
     wanted: f64,
     size: f64,
     /// Substeps of the present step.
     substeps: Option<Substeps>,
     /// The size of controlled steps, and the time at which the present step is complete.
-    controller: Option<Controller>,
+    controller: Option<Sizes>,
     due: f64,
+    /// Whether sizes are held.
+    holds: bool,
+    /// The attempts of the present step, after the first.
+    attempt: Option<Attempt>,
+    /// The last step.
+    last: Option<Last>,
+}
+
+/// An attempt that is shorter than those before it.
+#[derive(Clone, Copy, Debug)]
+struct Attempt {
+    size: f64,
+    halvings: u32,
+    refused_hvp: f64,
+}
+
+/// What the last step says about the size of the next one.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    tau: f64,
+    halvings: u32,
+    far: bool,
 }
 
 impl StepControl {
-    pub(crate) fn new<const D: usize>(case: &Case<D>) -> Result<Self, Error> {
+    /// The steps of a case.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for sizes and limits that are not positive, or do not fit together.
+    pub fn new<const D: usize>(case: &Case<D>) -> Result<Self, Error> {
         let (steps, largest) = (case.steps, largest_step(case.grid()));
         let rule = steps.rule.resolved(case.scales.mcf_step);
         let control = match steps.order {
             Order::Controlled(control) => Some(control),
             _ => (rule == StepRule::Controlled).then(ErrorControl::default),
         };
-        let controller = control.map(|control| Controller::new(control, case.scales.eps, largest));
+        let controller = control.map(|control| Sizes::new(control, case.scales.eps, largest));
         let mut control = Self {
             steps: TimeSteps { rule, ..steps },
             end: Stop::end(&case.stops).unwrap_or(f64::INFINITY),
@@ -60,13 +86,14 @@ impl StepControl {
             least_energy: least_energy(case.grid()),
             completed: 0,
             time: 0.0,
-            steps_gone: 0.0,
-            last_size: f64::NAN,
             wanted: rule.size(1),
             size: f64::NAN,
             substeps: None,
             controller: controller.transpose()?,
             due: f64::INFINITY,
+            holds: !case.held.is_empty(),
+            attempt: None,
+            last: None,
         };
         control.begin(steps.first_substep.unwrap_or(f64::INFINITY))?;
         Ok(control)
@@ -87,7 +114,7 @@ impl StepControl {
     }
 
     /// The size of the present step by the rule.
-    pub(crate) fn step_size(&self) -> f64 {
+    fn step_size(&self) -> f64 {
         if self.wanted.is_finite() {
             self.wanted
         } else {
@@ -95,7 +122,7 @@ impl StepControl {
         }
     }
 
-    pub(crate) fn next_size(&self) -> f64 {
+    fn next_size(&self) -> f64 {
         match (self.controller, self.substeps) {
             (Some(controller), _) => controller.size(self.due - self.time),
             (None, Some(substeps)) => substeps.size(),
@@ -104,12 +131,12 @@ impl StepControl {
     }
 
     /// The size with which a controlled step is made again, if it was too long.
-    pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
+    fn shorter(&self, made: &StepRecord) -> Option<f64> {
         self.controller?.shorter(made)
     }
 
     /// How often that size may be halved where a minimization fails.
-    pub(crate) fn halvings(&self) -> u32 {
+    fn halvings(&self) -> u32 {
         let adapts = matches!(self.steps.rule, StepRule::ByEnergy(_)) || self.controller.is_some();
         let of_steps = if adapts { HALVINGS } else { 0 };
         (self.substeps).map_or(of_steps, |substeps| substeps.halvings())
@@ -117,19 +144,40 @@ impl StepControl {
 
     /// How often a step may be halved that moves the interface too far, or cannot hold what it is to hold. Substeps have a smallest size, of which
     /// places in the step are multiples.
-    pub(crate) fn halvings_of_motion(&self) -> u32 {
+    fn halvings_of_motion(&self) -> u32 {
         self.substeps
             .map_or(HALVINGS_OF_MOTION, |substeps| substeps.halvings())
     }
 
-    pub(crate) fn step(&self) -> usize {
-        self.completed + 1
+    /// The attempt that is made next: what was too long for the last step is not tried again at once.
+    fn attempt(&self) -> Attempt {
+        if let Some(attempt) = self.attempt {
+            return attempt;
+        }
+        let (mut size, mut halvings) = (self.next_size(), 0);
+        let is_limited = self.steps.longest_move.is_some();
+        if let Some(last) = self.last.filter(|last| is_limited && last.halvings > 0) {
+            let longer = if last.far { 1.5 } else { 2.0 };
+            while size > longer * last.tau && halvings < self.halvings_of_motion() {
+                size *= 0.5;
+                halvings += 1;
+            }
+        }
+        Attempt {
+            size,
+            halvings,
+            refused_hvp: 0.0,
+        }
     }
 
-    /// Moves on by a minimization; true if it completes the present step.
-    pub(crate) fn accept(&mut self, record: &Record) -> Result<bool, Error> {
-        self.last_size = self.step_size();
-        self.steps_gone += record.tau / self.last_size;
+    /// Moves on by a step; true if it completes the present time step.
+    fn made(&mut self, record: &Record) -> Result<bool, Error> {
+        self.attempt = None;
+        self.last = Some(Last {
+            tau: record.tau,
+            halvings: record.halvings,
+            far: record.far,
+        });
         self.time = record.time;
         let mut substep = f64::INFINITY;
         if let Some(controller) = &mut self.controller {
@@ -152,12 +200,91 @@ impl StepControl {
             StepRule::ByEnergy(_) if self.size < before && record.halvings == 0 => before,
             StepRule::ByEnergy(_) => after(record, self.least_energy).min(self.largest),
             StepRule::Graded { first, part } => first.max(part * self.time),
-            rule => rule.size(self.step()),
+            rule => rule.size(self.completed + 1),
         };
         // Steps that double begin with twice the size, too.
         self.begin(self.wanted / before * substep)?;
         Ok(true)
     }
+}
+
+impl<const D: usize> Controller<D> for StepControl {
+    fn next(&self) -> StepSize {
+        StepSize {
+            tau: self.attempt().size,
+            whole: self.step_size(),
+        }
+    }
+
+    fn judge(
+        &mut self,
+        from: &State<D>,
+        made: Result<&Candidate<D>, &StepError>,
+    ) -> Result<Verdict, StepError> {
+        let attempt = self.attempt();
+        let halvings = attempt.halvings;
+        let mut most = self.halvings();
+        if self.holds {
+            most = most.max(self.halvings_of_motion());
+        }
+        let mut shorter = None;
+        let refused = match made {
+            Ok(candidate) => {
+                let made = candidate.made.as_ref();
+                shorter = made.and_then(|made| self.shorter(made));
+                shorter = shorter.filter(|_| halvings < most);
+                if shorter.is_none() {
+                    // How far it has gone over how far it may go.
+                    let part = match self.steps.longest_move {
+                        Some(longest) => has_gone(from, &candidate.state)? / longest,
+                        None => 0.0,
+                    };
+                    if part <= 1.0 || halvings >= self.halvings_of_motion() {
+                        return Ok(Verdict::Accept(Attempts {
+                            halvings,
+                            far: part > FAR,
+                            refused_hvp: attempt.refused_hvp,
+                        }));
+                    }
+                }
+                made
+            }
+            Err(error) if most == 0 || !error.shorter_step_may_succeed() => {
+                return Ok(Verdict::GiveUp { halvings: 0 });
+            }
+            Err(_) if halvings < most => None,
+            Err(_) => return Ok(Verdict::GiveUp { halvings }),
+        };
+        self.attempt = Some(Attempt {
+            size: shorter.unwrap_or(0.5 * attempt.size),
+            halvings: halvings + 1,
+            refused_hvp: attempt.refused_hvp + refused.map_or(0.0, StepRecord::hvp),
+        });
+        Ok(Verdict::Retry)
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<bool, Error> {
+        self.made(record)
+    }
+
+    fn identity(&self) -> serde_json::Value {
+        serde_json::json!(self.steps)
+    }
+
+    fn needs_estimates(&self) -> bool {
+        self.controller.is_some()
+    }
+}
+
+/// How many of its widths the interface has moved in a step, also to where there was none ([`widths_between`]); infinitely many if it is away
+/// altogether.
+fn has_gone<const D: usize>(from: &State<D>, to: &State<D>) -> Result<f64, StepError> {
+    let now = to.stored()?;
+    if !has_interface(&now) {
+        return Ok(f64::INFINITY);
+    }
+    let before = from.field.stored()?;
+    Ok(widths_between(&before, &now).max(widths_between(&now, &before)))
 }
 
 /// The size by the energy after a step.

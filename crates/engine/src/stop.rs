@@ -61,8 +61,6 @@ pub(crate) struct Progress<'a, const D: usize> {
     pub(crate) current: Current<'a, D>,
     /// Number of completed time steps.
     pub(crate) steps: usize,
-    /// Size of the time step of the last record.
-    pub(crate) step_size: f64,
     /// Whether the energy is the bending energy alone.
     pub(crate) is_willmore: bool,
 }
@@ -104,7 +102,7 @@ impl Stop {
                 gone.is_some_and(|gone| gone >= length)
             }
             Self::Motion(limit) => {
-                last.is_some_and(|r| r.moved * flow.step_size / r.tau <= limit * r.travelled)
+                last.is_some_and(|r| r.moved * r.step_size / r.tau <= limit * r.travelled)
             }
             Self::EnergyAtRest => {
                 let last = flow.records.last_chunk::<IN_A_ROW>();

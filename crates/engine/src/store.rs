@@ -1,17 +1,18 @@
 //! Runs that are stored in directories.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::{Bricks, Field, Grid, NodeSet, Nodes, PhaseField, Stored};
+use geometry::{Bricks, Grid, NodeSet, Nodes, PhaseField, Stored};
 use operators::ComputeDevice;
-use runs::{RunDirectory, State, StoredRun};
+use runs::{RunDirectory, State as Packed, StoredRun};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use solver::FlowState;
+use solver::{DeviceField, Memory, State};
 
 use crate::record::to_csv;
 use crate::{Case, Error, Flow, Record, Run, Stop};
@@ -183,8 +184,7 @@ pub fn initial<const D: usize>(stored: &StoredRun) -> Result<(Stored<D>, Option<
         NodeSet::from_ranges(grid.len(), ranges)
             .ok_or_else(|| unreadable(stored, "its region is none of its grid"))
     });
-    let initial = phase_field(stored, "initial", &nodes(stored, "initial_bricks", grid)?)?;
-    Ok((initial, region.transpose()?))
+    Ok((phase_field(stored, "initial", grid)?, region.transpose()?))
 }
 
 /// All records of a stored run with their wall times, which are not a number where they are lost: the file is not checked.
@@ -198,11 +198,21 @@ pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
     Ok(records)
 }
 
-fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>, Error> {
-    let state = run.state()?;
-    let (previous, previous_tau) = state.previous.unzip();
-    let marks = |u: &Stored<D>| u.nodes().bricks().map(|bricks| bricks.marks());
-    let bricks = marks(&state.current);
+/// A field in the memory of a state: its grid, and its values where nothing is stored.
+#[derive(Serialize, Deserialize)]
+struct Remembered {
+    cells: usize,
+    rests: [f64; 2],
+}
+
+fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>, Error> {
+    let state = &run.state;
+    let fields = state.memory.fields.iter();
+    let fields = fields.map(|(name, field)| {
+        let (cells, rests) = (field.nodes().grid().cells(), field.rests());
+        (name.clone(), Remembered { cells, rests })
+    });
+    let fields: BTreeMap<String, Remembered> = fields.collect();
     let notes = json!({
         "case": run.identity(),
         "application": notes,
@@ -210,25 +220,18 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
         "ended": run.ended(),
         "records": run.records,
         "time": state.time,
-        "previous_tau": previous_tau,
+        "progress": state.progress,
+        "memory": { "fields": fields, "numbers": state.memory.numbers },
     });
     let initial = &run.case.initial;
-    let mut packed = State::new(run.records.len() as u64, notes)
-        .with_array("initial", initial.values())
-        .with_array("current", state.current.into_values());
-    let optional = [
-        ("initial_bricks", marks(initial)),
-        ("bricks", bricks),
-        ("previous", previous.map(Stored::into_values)),
-        ("rate", state.rate.map(Stored::into_values)),
-    ];
-    for (name, values) in optional {
-        if let Some(values) = values {
-            packed = packed.with_array(name, values);
-        }
+    let mut packed = Packed::new(run.records.len() as u64, notes)
+        .with_array("initial", initial.values());
+    if let Some(marks) = marks(initial.nodes()) {
+        packed = packed.with_array(&bricks_of("initial"), marks);
     }
-    for (level, motion) in state.half_motions.into_iter().enumerate() {
-        packed = packed.with_array(&half_motion(level), motion.into_values());
+    packed = with_field(packed, "current", &state.field)?;
+    for (name, field) in &state.memory.fields {
+        packed = with_field(packed, name, field)?;
     }
     if let Some(region) = &run.case.region {
         let ranges = region.ranges().iter();
@@ -238,8 +241,26 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<State<'a>,
     Ok(packed)
 }
 
-fn half_motion(level: usize) -> String {
-    format!("half_motion_{level}")
+/// Adds a field, with the bricks on which it is stored, if it is on bricks.
+fn with_field<'a, const D: usize>(
+    packed: Packed<'a>,
+    name: &str,
+    field: &DeviceField<D>,
+) -> Result<Packed<'a>, Error> {
+    let packed = match marks(field.nodes()) {
+        Some(marks) => packed.with_array(&bricks_of(name), marks),
+        None => packed,
+    };
+    Ok(packed.with_array(name, field.stored()?.into_values()))
+}
+
+fn marks<const D: usize>(nodes: &Nodes<D>) -> Option<Vec<f64>> {
+    nodes.bricks().map(|bricks| bricks.marks())
+}
+
+/// The name of the marks of the bricks on which a field is stored.
+fn bricks_of(field: &str) -> String {
+    format!("{field}_bricks")
 }
 
 fn restore<const D: usize>(
@@ -248,39 +269,46 @@ fn restore<const D: usize>(
     device: &ComputeDevice,
     differing: &[&str],
 ) -> Result<Run<D>, Error> {
-    let state = stored.state();
+    let notes = &stored.state().notes;
     let mut wanted = case.identity(device);
     for &key in differing {
-        wanted[key] = state.notes["case"][key].clone();
+        wanted[key] = notes["case"][key].clone();
     }
     check_identity(stored, &wanted)?;
-    let grid = *case.grid();
-    let nodes = nodes(stored, "bricks", grid)?;
-    let optional = |name: &str| {
-        let is_there = state.array(name).is_some();
-        is_there
-            .then(|| phase_field(stored, name, &nodes))
-            .transpose()
+    let start = read(stored, &notes["start"])?;
+    let mut run = Run::at(case, device, start, records(stored)?)?;
+    let state = state(stored, &run)?;
+    run.go_to(state)?;
+    Ok(run)
+}
+
+/// The stored state of a run.
+fn state<const D: usize>(stored: &StoredRun, run: &Run<D>) -> Result<State<D>, Error> {
+    let (packed, grid) = (stored.state(), *run.case.grid());
+    let notes = &packed.notes;
+    let field = phase_field(stored, "current", grid)?;
+    let upload = |u: Stored<D>, rests: [f64; 2]| {
+        let nodes = u.nodes().clone();
+        DeviceField::upload(&Stored::new(u.into_values(), nodes, rests), &run.device)
     };
-    let previous_tau: Option<f64> = read(stored, &state.notes["previous_tau"])?;
-    // Where nothing is stored nothing moves.
-    let rate =
-        optional("rate")?.map(|rate| Stored::new(rate.into_values(), nodes.clone(), [0.0; 2]));
-    let (mut half_motions, mut half) = (Vec::new(), grid);
-    while let Some(motion) = state.array(&half_motion(half_motions.len())) {
-        half = half.half()?;
-        half_motions.push(Field::from_values(half, motion.to_vec())?);
+    let fields: BTreeMap<String, Remembered> = read(stored, &notes["memory"]["fields"])?;
+    let mut memory = Memory {
+        fields: BTreeMap::new(),
+        numbers: read(stored, &notes["memory"]["numbers"])?,
+    };
+    for (name, Remembered { cells, rests }) in fields {
+        let grid = Grid::new(cells, grid.side())?.with_origin(grid.origin())?;
+        let field = upload(phase_field(stored, &name, grid)?, rests);
+        memory.fields.insert(name, field);
     }
-    let at = FlowState {
-        current: phase_field(stored, "current", &nodes)?,
-        previous: optional("previous")?.zip(previous_tau),
-        rate,
-        half_motions,
-        step: usize::try_from(state.step).map_err(|error| unreadable(stored, error))?,
-        time: read(stored, &state.notes["time"])?,
-    };
-    let start = read(stored, &state.notes["start"])?;
-    Run::at(case, device, start, records(stored)?, Some(&at))
+    Ok(State {
+        // As at the start, where nothing is stored.
+        field: upload(field, run.state.field.rests()),
+        step: usize::try_from(packed.step).map_err(|error| unreadable(stored, error))?,
+        time: read(stored, &notes["time"])?,
+        progress: read(stored, &notes["progress"])?,
+        memory,
+    })
 }
 
 /// Refuses a stored run of another case, and says in what it differs.
@@ -308,23 +336,21 @@ fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {
     Ok(Grid::new(cells, side)?.with_origin(origin)?)
 }
 
-/// Where the values of phase fields lie, by the name of the marks of their bricks.
-fn nodes<const D: usize>(stored: &StoredRun, name: &str, grid: Grid<D>) -> Result<Nodes<D>, Error> {
-    let Some(marks) = stored.state().array(name) else {
-        return Ok(grid.into());
-    };
-    let bricks = Bricks::with_marks(grid.cells(), marks);
-    let bricks = bricks.map_err(|error| unreadable(stored, error))?;
-    Ok(Nodes::on_bricks(grid, Arc::new(bricks)))
-}
-
 fn phase_field<const D: usize>(
     stored: &StoredRun,
     name: &str,
-    nodes: &Nodes<D>,
+    grid: Grid<D>,
 ) -> Result<Stored<D>, Error> {
-    let values = stored.state().array(name).unwrap_or_default().to_vec();
-    let field = Stored::from_values(nodes.clone(), values);
+    let array = |name: &str| stored.state().array(name);
+    let nodes = match array(&bricks_of(name)) {
+        Some(marks) => {
+            let bricks = Bricks::with_marks(grid.cells(), marks);
+            let bricks = bricks.map_err(|error| unreadable(stored, error))?;
+            Nodes::on_bricks(grid, Arc::new(bricks))
+        }
+        None => grid.into(),
+    };
+    let field = Stored::from_values(nodes, array(name).unwrap_or_default().to_vec());
     field.map_err(|error| unreadable(stored, format!("its array {name}: {error}")))
 }
 

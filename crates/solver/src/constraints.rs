@@ -6,7 +6,7 @@
 //! - Conjugate gradients solve `H p = -(g + A lambda)` for motions with `A^T p = 0`, `A` being the gradients of `C`, `g` that of `E`, and
 //!   `H` the second derivative of `E + lambda C`. For that the preconditioner `P` is projected, `P - P A (A^T P A)^-1 A^T P`, whose spectrum
 //!   with `H` lies within that of `P`: constraints cost no iterations. What is left of the residual corrects the multipliers.
-//! - Every trial is [restored](Held::restored) to `C = C*` by Newton's method for one or two numbers: displacements of the interface along its
+//! - Every trial is [restored](Restoring::restored) to `C = C*` by Newton's method for one or two numbers: displacements of the interface along its
 //!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile. A perimeter
 //!   that is held alone is restored by the shorter one of both, since the second one sharpens edges.
 
@@ -18,11 +18,9 @@ use operators::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
-use crate::active::Active;
+use crate::{DeviceField, Error};
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::region::Region;
-use crate::stored::stored;
 
 /// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;
@@ -152,9 +150,9 @@ impl Constraints {
 }
 
 /// Perimeter and volume during one minimization.
-pub(crate) struct Held<'a, const D: usize> {
-    grid: Grid<D>,
-    active: Option<&'a Active<D>>,
+pub(crate) struct Restoring<'a, const D: usize> {
+    /// The phase field of the start, where values are stored as in all others.
+    like: &'a DeviceField<D>,
     eps: f64,
     targets: [Option<f64>; 2],
     region: Option<&'a Region<D>>,
@@ -187,22 +185,20 @@ struct Part {
     target: f64,
 }
 
-impl<'a, const D: usize> Held<'a, D> {
-    /// Holds the constraints, if there are any, for phase fields of interface width `eps` on a grid or its active bricks.
+impl<'a, const D: usize> Restoring<'a, D> {
+    /// Holds the constraints, if there are any, for phase fields of interface width `eps` that are stored `like` this one.
     pub(crate) fn new(
         constraints: &Constraints,
-        (grid, active): (Grid<D>, Option<&'a Active<D>>),
+        like: &'a DeviceField<D>,
         eps: f64,
         region: Option<&'a Region<D>>,
-        device: &'a ComputeDevice,
     ) -> Option<Self> {
         (!constraints.is_empty()).then(|| Self {
-            grid,
-            active,
+            like,
             eps,
             targets: constraints.targets(),
             region,
-            device,
+            device: like.device(),
             multipliers: [0.0; 2],
             solved: false,
         })
@@ -275,7 +271,7 @@ impl<'a, const D: usize> Held<'a, D> {
 
     /// None for values that are not finite.
     fn tangent(&self, u: &Tensor<D>) -> Result<Option<Tangent<D>>, Error> {
-        let stored = stored(u, self.grid, self.active, self.device)?;
+        let stored = self.like.with(u.clone()).stored()?;
         let sizes = match Sizes::of(&stored, self.eps) {
             Err(geometry::Error::NonFinite { .. }) => return Ok(None),
             sizes => sizes?,

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor};
 use linearize::{Graph, Linearization, Value};
-use model::{BrickOperator, MeanCurvatureOperator};
+use geometry::Nodes;
+use model::{BrickOperator, Factors, MeanCurvatureOperator};
 use operators::{ComputeDevice, spectral_filter};
 
 use crate::error::StepFailure;
@@ -36,6 +37,26 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D>;
 
+    /// The values near -1 and 1 that it keeps.
+    fn rests(&self) -> [f64; 2] {
+        [-1.0, 1.0]
+    }
+
+    /// The side of the bricks on which it can work, if it can.
+    fn brick_side(&self) -> Option<usize> {
+        None
+    }
+
+    /// The same step for values that are stored at these nodes.
+    fn on(&self, _nodes: &Nodes<D>) -> Result<Arc<dyn MeanCurvatureStep<D>>, StepFailure> {
+        Err("this step works on the whole grid only".into())
+    }
+
+    /// The same step on the grid of half as many cells, where minimizations may begin.
+    fn coarser(&self, _factors: Factors) -> Result<Option<Coarser<D>>, StepFailure> {
+        Ok(None)
+    }
+
     /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
     fn set_accuracy(&self, _accuracy: &Accuracy) {}
 
@@ -43,6 +64,14 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     fn failure(&self) -> Option<StepFailure> {
         None
     }
+}
+
+/// A step on a coarser grid.
+pub struct Coarser<const D: usize> {
+    /// The step.
+    pub step: Arc<dyn MeanCurvatureStep<D>>,
+    /// Its calibration.
+    pub factors: Factors,
 }
 
 /// What the outer iteration asks of an inner solver.

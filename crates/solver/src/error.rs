@@ -47,6 +47,15 @@ pub enum Error {
         least: f64,
         reduced_volume: f64,
     },
+    #[error(
+        "a reduced volume of {target} is not possible: a ball has 1, any other shape less, this one {present:.4} at the beginning"
+    )]
+    ReducedVolume { target: f64, present: f64 },
+    #[error(
+        "no shape in the box with the volume {volume:.5e} has less surface than {perimeter:.5e}, so that nothing could move (in the plane, length and \
+         area): hold one of the two sizes, or more surface for this volume (a smaller reduced volume)"
+    )]
+    LeastPerimeter { perimeter: f64, volume: f64 },
     #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
     VolumeTooLarge { volume: f64, box_volume: f64 },
     #[error(

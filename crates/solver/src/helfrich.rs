@@ -1,11 +1,10 @@
 //! Spontaneous curvature, tension and pressure: what the energy has besides bending.
 
 use burn::tensor::Tensor;
-use geometry::Grid;
+use geometry::{Bricks, Grid, Nodes};
 use operators::{ComputeDevice, brick_convolution, circular_convolution, convolution_of_outside};
 use serde::{Deserialize, Serialize};
 
-use crate::active::Active;
 use crate::{Error, FlowParams};
 
 /// The second derivative by central differences of eighth order: weights of the node and of its neighbours.
@@ -42,7 +41,7 @@ impl Helfrich {
         *self == Self::default()
     }
 
-    fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         for (name, value) in [
             ("spontaneous curvature", self.spontaneous_curvature),
             ("tension", self.tension),
@@ -96,8 +95,7 @@ struct DirichletForm<const D: usize> {
 }
 
 impl<const D: usize> DirichletForm<D> {
-    fn new(active: &Active<D>, device: &ComputeDevice) -> Self {
-        let bricks = &active.bricks;
+    fn new(grid: &Grid<D>, bricks: &Bricks<D>, rests: [f64; 2], device: &ComputeDevice) -> Self {
         let (side, neighbours) = (bricks.side(), bricks.neighbours());
         let taps = [-SMALL, SMALL].map(|part| {
             let mut taps = second_difference().map(|weight| part * weight);
@@ -109,7 +107,6 @@ impl<const D: usize> DirichletForm<D> {
                 taps.map(|taps| convolution_of_outside::<D>(side, &neighbours, &taps, values));
             minus.iter().zip(&plus).map(|(a, b)| a - b).collect()
         };
-        let rests = active.rests();
         let outside: Vec<f64> = of_outside(rests).iter().map(|x| 2.0 * x).collect();
         // Near the edge of the bricks all nodes are in one phase, and second differences of constants vanish.
         let rest = -of_outside(rests.map(|rest| rest * rest))
@@ -120,7 +117,7 @@ impl<const D: usize> DirichletForm<D> {
             neighbours: device.tensor(&neighbours, [bricks.places().len(), 2 * D]),
             outside: device.tensor(&outside, bricks.shape()),
             rest,
-            scale: 1.0 / (2.0 * SMALL * active.grid.spacing().powi(2)),
+            scale: 1.0 / (2.0 * SMALL * grid.spacing().powi(2)),
         }
     }
 
@@ -164,12 +161,15 @@ impl<const D: usize> HelfrichTerms<D> {
         })
     }
 
-    /// The same for phase fields on active bricks.
-    pub(crate) fn on(&self, active: &Active<D>, device: &ComputeDevice) -> Self {
-        let dirichlet = || Box::new(DirichletForm::new(active, device));
+    /// The same for phase fields at these nodes.
+    pub(crate) fn on(&self, nodes: &Nodes<D>, rests: [f64; 2], device: &ComputeDevice) -> Self {
+        let Some(bricks) = nodes.bricks() else {
+            return self.clone();
+        };
+        let dirichlet = || Box::new(DirichletForm::new(nodes.grid(), bricks, rests, device));
         Self {
             on_bricks: (self.tension != 0.0).then(dirichlet),
-            inside: active.bricks.outside()[1] as f64,
+            inside: bricks.outside()[1] as f64,
             ..self.clone()
         }
     }

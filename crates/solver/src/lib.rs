@@ -41,34 +41,52 @@
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
-mod active;
+mod bricks;
 mod cg;
 mod constraints;
 mod displacement;
 mod dissection;
 mod energy;
 mod error;
-mod flow;
+mod euler;
+mod held;
 mod helfrich;
 mod interface;
+mod learned;
+mod mean_curvature;
+mod movement;
 mod newton;
 mod params;
 mod preconditioner;
+mod problem;
+mod record;
 mod region;
 mod samples;
+mod scheme;
+mod second_order;
 mod sparse;
-mod stored;
+mod start;
+mod state;
 mod times;
 
 pub use constraints::Constraints;
 pub use displacement::widths_between;
-pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
+pub use energy::{Accuracy, Coarser, MeanCurvatureStep, MinimizingMovement, Objective};
 pub use error::{Error, StepFailure};
-pub use flow::{FlowState, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow};
+pub use euler::Euler;
+pub use held::{Held, Target};
 pub use helfrich::{Helfrich, HelfrichTerms};
 pub use model::Factors;
+pub use learned::LearnedStep;
+pub use mean_curvature::MeanCurvature;
+pub use movement::{Minimizations, Minimum, Movement};
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
 pub use params::{FlowParams, Method, NewtonParams, Precision};
 pub use preconditioner::PhaseInverse;
+pub use problem::Problem;
+pub use record::{Start, StartKind, StepRecord};
+pub use scheme::{Candidate, Scheme, StepSize};
+pub use second_order::{SecondOrder, StepEstimates};
+pub use state::{DeviceField, Memory, State};
 pub use times::PhaseTimes;

@@ -10,7 +10,7 @@ use operators::{ComputeDevice, retract};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
-use crate::constraints::{Held, Place, Tangent};
+use crate::constraints::{Place, Restoring, Tangent};
 use crate::preconditioner::{Level, Preconditioner};
 use crate::region::Region;
 use crate::times::{PhaseTimes, timed};
@@ -83,7 +83,7 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     objective: &'a mut O,
     /// Outside of it, values stay as they were.
     region: Option<&'a Region<D>>,
-    held: Option<&'a mut Held<'h, D>>,
+    held: Option<&'a mut Restoring<'h, D>>,
     params: NewtonParams,
     device: &'a ComputeDevice,
     preconditioner: Option<Preconditioner<D>>,
@@ -120,7 +120,7 @@ pub fn minimize<const D: usize>(
 /// [`minimize`] with a preconditioner and the time of its parts, in a region if there is one, and with measures held at targets.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
-    (region, held): (Option<&Region<D>>, Option<&mut Held<'_, D>>),
+    (region, held): (Option<&Region<D>>, Option<&mut Restoring<'_, D>>),
     previous: &Tensor<D>,
     start: &Tensor<D>,
     preconditioner: Option<Preconditioner<D>>,

@@ -3,9 +3,8 @@
 use geometry::zero_set::{least_perimeter, reduced_volume};
 use geometry::{Grid, PhaseField, ZeroSet};
 use serde::{Deserialize, Serialize};
-use solver::Constraints;
 
-use crate::Error;
+use crate::{Constraints, Error};
 
 /// Balls that are measured are round to this part of their perimeter.
 const ROUND: f64 = 1e-4;
@@ -53,6 +52,17 @@ pub struct Held {
     pub perimeter: Option<Target>,
     /// Area (2D) or volume (3D) of the inside.
     pub volume: Option<Target>,
+}
+
+impl From<Constraints> for Held {
+    /// These sizes from the next step on.
+    fn from(constraints: Constraints) -> Self {
+        let keep = |value: Option<f64>| value.map(Target::keep);
+        Self {
+            perimeter: keep(constraints.perimeter),
+            volume: keep(constraints.volume),
+        }
+    }
 }
 
 impl Held {
@@ -104,8 +114,8 @@ impl Held {
     }
 
     /// Refuses perimeter and volume of a ball together, or of another shape with the [least perimeter](least_perimeter) in the box. What no
-    /// shape has is refused by [`solver::WillmoreFlow::constrain`].
-    pub(crate) fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
+    /// shape has is refused by [`crate::Problem::hold`].
+    pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
         let targets = self.targets();
         match (targets.perimeter, targets.volume) {
             (Some(perimeter), Some(volume))
@@ -118,13 +128,13 @@ impl Held {
     }
 
     /// How many steps reach all targets.
-    pub(crate) fn steps(&self) -> usize {
+    pub fn steps(&self) -> usize {
         let targets = self.perimeter.iter().chain(&self.volume);
         targets.map(|target| target.over).max().unwrap_or(0)
     }
 
     /// Whether so many steps reach all targets.
-    pub(crate) fn is_reached(&self, steps: f64) -> bool {
+    pub fn is_reached(&self, steps: f64) -> bool {
         let mut targets = self.perimeter.iter().chain(&self.volume);
         targets.all(|target| target.is_reached(steps))
     }

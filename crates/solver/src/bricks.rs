@@ -1,0 +1,163 @@
+//! Which bricks are active: those near the interface.
+
+use std::sync::Arc;
+
+use geometry::{Bricks, Nodes, PhaseField, Stored, parallel};
+
+use crate::{DeviceField, Error};
+
+/// Bricks nearer to the interface than this are active, in units of `eps`: the phase field ends where it differs from the pure phases by
+/// `1e-5`, which changes a flow by a millionth of its motion.
+const REACH: f64 = 8.0;
+/// When the interface has come nearer to the edge than this, the set is too small.
+const MARGIN: f64 = 5.0;
+/// Nodes are worked on in pieces of this many.
+const CHUNK: usize = 1 << 14;
+
+/// Nodes in bricks of `side` cells near the interface of a phase field that may be stored in another way.
+///
+/// # Errors
+/// [`Error::NoInterface`], [`Error::Geometry`] if the grid cannot be divided into such bricks.
+pub(crate) fn near<const D: usize>(
+    u: &impl PhaseField<D>,
+    side: usize,
+    eps: f64,
+) -> Result<Nodes<D>, Error> {
+    let grid = *u.nodes().grid();
+    let all = Bricks::<D>::new(grid.cells(), side, |_| false, |_| false)?;
+    let reached = reached(&all, u.nodes(), u.values(), REACH * eps);
+    let bricks = Bricks::new(
+        grid.cells(),
+        side,
+        |place| reached[all.flat(place)],
+        |place| u.at(place.map(|at| at * side)) > 0.0,
+    )?;
+    if bricks.is_empty() {
+        return Err(Error::NoInterface);
+    }
+    Ok(Nodes::on_bricks(grid, Arc::new(bricks)))
+}
+
+/// The nodes of the bricks near the interface of `u`, if it is on others. Where the interface has vanished, all stay.
+pub(crate) fn following<const D: usize>(
+    u: &DeviceField<D>,
+    eps: f64,
+) -> Result<Option<Nodes<D>>, Error> {
+    let Some(bricks) = u.nodes().bricks() else {
+        return Ok(None);
+    };
+    let stored = u.stored()?;
+    let near = reached(bricks, u.nodes(), stored.values(), REACH * eps);
+    if !near.contains(&true) {
+        return Ok(None);
+    }
+    replaced(&stored, bricks, |place| near[bricks.flat(place)])
+}
+
+/// The nodes of those bricks and of the bricks near the interface of `u`, if that has come near their edge.
+pub(crate) fn enlarged<const D: usize>(
+    u: &DeviceField<D>,
+    eps: f64,
+) -> Result<Option<Nodes<D>>, Error> {
+    let Some(bricks) = u.nodes().bricks() else {
+        return Ok(None);
+    };
+    let stored = u.stored()?;
+    let needed = reached(bricks, u.nodes(), stored.values(), MARGIN * eps);
+    let places = (0..needed.len()).filter(|&brick| needed[brick]);
+    let missing = places
+        .map(|brick| bricks.place(brick))
+        .any(|place| bricks.number(place).is_none());
+    if !missing {
+        return Ok(None);
+    }
+    let near = reached(bricks, u.nodes(), stored.values(), REACH * eps);
+    replaced(&stored, bricks, |place| {
+        near[bricks.flat(place)] || bricks.number(place).is_some()
+    })
+}
+
+/// The nodes of the bricks that are `active`, in place of those of `u`, if they are others.
+fn replaced<const D: usize>(
+    u: &Stored<D>,
+    bricks: &Bricks<D>,
+    active: impl Fn([usize; D]) -> bool,
+) -> Result<Option<Nodes<D>>, Error> {
+    let positive = |place| match bricks.number(place) {
+        Some(number) => u.values()[number * bricks.volume()] > 0.0,
+        None => bricks.is_positive(place),
+    };
+    let next = Bricks::new(bricks.cells(), bricks.side(), active, positive)?;
+    let nodes = |next| Nodes::on_bricks(*u.grid(), Arc::new(next));
+    Ok((next != *bricks).then(|| nodes(next)))
+}
+
+    /// For every place of a brick, whether a cell there is within `reach` of one beside a change of sign; which bricks are stored does not matter.
+    fn reached<const D: usize>(bricks: &Bricks<D>, nodes: &Nodes<D>, u: &[f64], reach: f64) -> Vec<bool> {
+        let (side, per_axis) = (bricks.side(), bricks.per_axis());
+        let mut cells_of = vec![Vec::new(); per_axis.pow(D as u32)];
+        for place in interface(nodes, u) {
+            let brick = bricks.flat(place.map(|at| at / side));
+            cells_of[brick].push(place.map(|at| (at % side) as i64));
+        }
+        let reach = reach / nodes.grid().spacing();
+        let furthest = (reach / side as f64).floor() as i64 + 1;
+        let offsets = 2 * furthest + 1;
+        let holders = (0..cells_of.len()).filter(|&brick| !cells_of[brick].is_empty());
+        let holders: Vec<usize> = holders.collect();
+        let offset = |mut number: i64| -> [i64; D] {
+            std::array::from_fn(|_| {
+                let offset = number % offsets - furthest;
+                number /= offsets;
+                offset
+            })
+        };
+        let reached = parallel::map(holders.len(), 1, &|holder| -> Vec<usize> {
+            let (cells, place) = (
+                &cells_of[holders[holder]],
+                bricks.place(holders[holder]),
+            );
+            (0..offsets.pow(D as u32))
+                .map(offset)
+                .filter(|offset| {
+                    let mut cells = cells.iter();
+                    cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
+                })
+                .map(|offset| {
+                    bricks.flat(std::array::from_fn(|axis| {
+                        (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
+                    }))
+                })
+                .collect()
+        });
+        let mut near = vec![false; cells_of.len()];
+        for brick in reached.into_iter().flatten() {
+            near[brick] = true;
+        }
+        near
+    }
+
+/// The square of the distance of a cell to the nearest one of the brick that is so many bricks away.
+fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 {
+    let squares = (0..D).map(|axis| {
+        let first = offset[axis] * side;
+        let gap = (first - cell[axis]).max(cell[axis] - (first + side - 1));
+        gap.max(0).pow(2)
+    });
+    squares.sum::<i64>() as f64
+}
+
+/// The places of the nodes beside which `u` changes its sign.
+fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
+    parallel::filter_map(u.len(), CHUNK, &|node| {
+        let place = nodes.place(node);
+        let positive = u[node] > 0.0;
+        let changes = (0..D).any(|axis| {
+            let beside = nodes.along(node, place, axis, [-1, 1]);
+            beside.into_iter().any(|beside| {
+                positive != beside.map_or_else(|positive| positive, |node| u[node] > 0.0)
+            })
+        });
+        changes.then_some(place)
+    })
+}

@@ -1,0 +1,254 @@
+//! Minimizations of the energy of a movement, wherever values are stored.
+
+use std::sync::Arc;
+
+use burn::tensor::Tensor;
+use geometry::Nodes;
+
+use crate::constraints::{Constraints, Restoring};
+use crate::newton::{NewtonInfo, minimize_timed};
+use crate::preconditioner::{PhaseInverse, Preconditioner};
+use crate::region::Region;
+use crate::times::PhaseTimes;
+use crate::{
+    Accuracy, DeviceField, Error, Exit, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
+    Problem, State, bricks,
+};
+
+/// One minimization, of `1/2 |s (u - a)|^2` and the weighted energy.
+#[derive(Clone, Debug)]
+pub struct Movement<const D: usize> {
+    /// The anchor `a`.
+    pub anchor: DeviceField<D>,
+    /// The factors `s` of the motion, if it is weighted.
+    pub factors: Option<DeviceField<D>>,
+    /// Where the minimization begins.
+    pub start: DeviceField<D>,
+    /// The time step, which weighs the energy.
+    pub tau: f64,
+    /// The sizes that are held.
+    pub targets: Constraints,
+}
+
+impl<const D: usize> Movement<D> {
+    /// The same from another start, stored at other nodes.
+    fn on(&self, nodes: &Nodes<D>, start: &DeviceField<D>) -> Result<Self, Error> {
+        let factors = self.factors.as_ref();
+        Ok(Self {
+            anchor: self.anchor.on(nodes)?,
+            // Where nothing moves, factors of the motion are near 1 or, which is the same, near -1.
+            factors: factors.map(|factors| factors.on(nodes)).transpose()?,
+            start: start.on(nodes)?,
+            ..*self
+        })
+    }
+
+    /// `1/2 |s (u - a)|^2`, in the inner product of the step inside.
+    fn fidelity(&self, inner: &dyn MeanCurvatureStep<D>, u: &Tensor<D>) -> Result<f64, Error> {
+        let mut motion = u.clone() - self.anchor.values().clone();
+        if let Some(factors) = &self.factors {
+            motion = motion * factors.values().clone();
+        }
+        let square = (motion.clone() * inner.mass(motion)).sum();
+        Ok(0.5 * self.anchor.device().scalar(square)?)
+    }
+}
+
+/// The result of a minimization.
+#[derive(Clone, Debug)]
+pub struct Minimum<const D: usize> {
+    /// The phase field, stored on more bricks than the start where the interface has come near their edge.
+    pub u: DeviceField<D>,
+    /// Its energy as in [`StepRecord::willmore_energy`](crate::StepRecord::willmore_energy).
+    pub willmore_energy: f64,
+    /// The multipliers of the sizes that are held, as in [`StepRecord`](crate::StepRecord).
+    pub tension: Option<f64>,
+    /// Likewise.
+    pub pressure: Option<f64>,
+    /// What the minimization did.
+    pub newton: NewtonInfo,
+    /// Wall times.
+    pub times: PhaseTimes,
+}
+
+/// The minimizations of a problem, with what is traced and uploaded for the nodes at which values are stored. It serves one problem.
+#[derive(Default)]
+pub struct Minimizations<const D: usize> {
+    prepared: Option<Prepared<D>>,
+}
+
+/// What is prepared for a set of nodes.
+struct Prepared<const D: usize> {
+    nodes: Nodes<D>,
+    step: Arc<dyn MeanCurvatureStep<D>>,
+    region: Option<Region<D>>,
+    terms: Option<HelfrichTerms<D>>,
+    /// The energy, and the one with factors of the motion, each traced when it is first minimized.
+    energies: [Option<MinimizingMovement<D>>; 2],
+    /// The inverse in the pure phases for a stiffness.
+    phase: Option<(u64, PhaseInverse<D>)>,
+}
+
+impl<const D: usize> Minimizations<D> {
+    /// Minimizes the energy of a movement; the tolerance is meant with respect to the motion from the phase field of the state. If the interface comes near
+    /// the edge of the bricks, these are made more, and the minimization goes on from there.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`], [`Error::NotHeld`]; those of tracing the energy.
+    pub fn minimize(
+        &mut self,
+        problem: &Problem<D>,
+        from: &State<D>,
+        mut movement: Movement<D>,
+    ) -> Result<Minimum<D>, Error> {
+        let mut current = from.field.on(movement.anchor.nodes())?;
+        let step = from.step + 1;
+        let mut minimum = self.minimize_here(problem, &current, &movement, step)?;
+        while let Some(nodes) = bricks::enlarged(&minimum.u, problem.params.eps)? {
+            movement = movement.on(&nodes, &minimum.u)?;
+            current = current.on(&nodes)?;
+            let again = self.minimize_here(problem, &current, &movement, step)?;
+            minimum = Minimum {
+                newton: again.newton.after(&minimum.newton),
+                times: minimum.times + again.times,
+                ..again
+            };
+        }
+        Ok(minimum)
+    }
+
+    /// What is prepared for these nodes.
+    fn prepared(
+        &mut self,
+        problem: &Problem<D>,
+        nodes: &Nodes<D>,
+    ) -> Result<&mut Prepared<D>, Error> {
+        let is_there = |prepared: &Prepared<D>| prepared.nodes == *nodes;
+        let prepared = match self.prepared.take().filter(is_there) {
+            Some(prepared) => prepared,
+            None => Prepared::new(problem, nodes)?,
+        };
+        Ok(self.prepared.insert(prepared))
+    }
+
+    /// The minimization on the values that are stored now, in the step of this number.
+    fn minimize_here(
+        &mut self,
+        problem: &Problem<D>,
+        current: &DeviceField<D>,
+        movement: &Movement<D>,
+        step: usize,
+    ) -> Result<Minimum<D>, Error> {
+        let (params, device) = (&problem.params, &problem.device);
+        let prepared = self.prepared(problem, movement.anchor.nodes())?;
+        let stiffness = params.stiffness(movement.tau);
+        let phase = prepared.fit(problem, stiffness);
+        let preconditioner = Preconditioner {
+            phase,
+            nodes: prepared.nodes.clone(),
+            eps: params.eps,
+            step: (movement.tau, stiffness),
+            region: prepared.region.clone(),
+            interface: None,
+        };
+        let inner = prepared.step.clone();
+        let (energy, region) = prepared.energy(problem, movement, stiffness)?;
+        let mut held = Restoring::new(&movement.targets, current, params.eps, region);
+        let minimized = minimize_timed(
+            energy,
+            (region, held.as_mut()),
+            current.values(),
+            movement.start.values(),
+            Some(preconditioner),
+            params.newton,
+            device,
+        );
+        let (u, newton, times) = minimized.map_err(|error| error.at(step))?;
+        if newton.exit == Exit::IterationLimit {
+            return Err(Error::NotConverged {
+                step,
+                estimate: newton.estimate,
+                tolerance: params.newton.tolerance,
+            });
+        }
+        if !device.values(u.clone())?.iter().all(|u| u.is_finite()) {
+            return Err(Error::non_finite(step, "phase field"));
+        }
+        let fidelity = movement.fidelity(&*inner, &u)?;
+        // The energy of standing still is 2 tau w.
+        let unit = problem.energy_scale() / (2.0 * movement.tau);
+        let multipliers = held.map(|held| held.multipliers.map(|value| unit * value));
+        let [tension, pressure] = multipliers.unwrap_or_default();
+        let targets = movement.targets;
+        Ok(Minimum {
+            u: current.with(u),
+            tension: targets.perimeter.map(|_| tension),
+            pressure: targets.volume.map(|_| pressure),
+            willmore_energy: problem.energy_scale() * (newton.energy - fidelity)
+                / (2.0 * movement.tau),
+            newton,
+            times,
+        })
+    }
+}
+
+impl<const D: usize> Prepared<D> {
+    fn new(problem: &Problem<D>, nodes: &Nodes<D>) -> Result<Self, Error> {
+        let step = problem.operator_on(nodes)?;
+        let region = problem.region.as_ref();
+        let region = region.map(|region| Region::new(nodes, region, &problem.device));
+        Ok(Self {
+            nodes: nodes.clone(),
+            step,
+            region,
+            terms: problem.terms_on(nodes)?,
+            energies: [None, None],
+            phase: None,
+        })
+    }
+
+    /// Fits preconditioner and accuracy to a weight of the curvature.
+    fn fit(&mut self, problem: &Problem<D>, stiffness: f64) -> PhaseInverse<D> {
+        match &self.phase {
+            Some((prepared, phase)) if *prepared == stiffness.to_bits() => phase.clone(),
+            _ => {
+                let cells = problem.grid.cells();
+                let phase = self.step.phase_preconditioner(cells, stiffness);
+                self.phase = Some((stiffness.to_bits(), phase.clone()));
+                self.step.set_accuracy(&Accuracy {
+                    stiffness,
+                    tolerance: problem.params.newton.tolerance,
+                    cg_tolerance: problem.params.newton.cg_tolerance,
+                });
+                phase
+            }
+        }
+    }
+
+    /// The energy of a movement, and the region in which values move.
+    fn energy(
+        &mut self,
+        problem: &Problem<D>,
+        movement: &Movement<D>,
+        stiffness: f64,
+    ) -> Result<(&mut MinimizingMovement<D>, Option<&Region<D>>), Error> {
+        let (anchor, factors) = (movement.anchor.values(), movement.factors.as_ref());
+        let energy = &mut self.energies[usize::from(factors.is_some())];
+        let traced = match energy.take() {
+            Some(traced) => traced,
+            None => MinimizingMovement::with_terms(
+                self.step.clone(),
+                anchor.dims(),
+                problem.params.newton.precision,
+                (factors.is_some(), self.terms.as_ref()),
+                &problem.device,
+            )?,
+        };
+        let energy = energy.insert(traced);
+        if let Some(factors) = factors {
+            energy.set_factors(factors.values());
+        }
+        energy.set(anchor, stiffness)?;
+        Ok((energy, self.region.as_ref()))
+    }
+}
