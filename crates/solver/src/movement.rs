@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::Nodes;
+use geometry::{NodeSet, Nodes};
 
 use crate::constraints::{Constraints, Restoring};
 use crate::newton::{NewtonInfo, minimize_timed};
@@ -11,7 +11,7 @@ use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, DeviceField, Error, Exit, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
+    Accuracy, DeviceField, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
     Problem, State, bricks,
 };
 
@@ -71,7 +71,8 @@ pub struct Minimum<const D: usize> {
     pub times: PhaseTimes,
 }
 
-/// The minimizations of a problem, with what is traced and uploaded for the nodes at which values are stored. It serves one problem.
+/// The minimizations of a problem, with what is traced and uploaded for the nodes at which values are stored. For another problem, or at other nodes, that
+/// is made anew.
 #[derive(Default)]
 pub struct Minimizations<const D: usize> {
     prepared: Option<Prepared<D>>,
@@ -80,6 +81,11 @@ pub struct Minimizations<const D: usize> {
 /// What is prepared for a set of nodes.
 struct Prepared<const D: usize> {
     nodes: Nodes<D>,
+    /// Of the problem: its parameters, operator, energy and region.
+    params: FlowParams,
+    operator: Arc<dyn MeanCurvatureStep<D>>,
+    energy: (Helfrich, u64),
+    nodes_that_move: Option<Arc<NodeSet>>,
     step: Arc<dyn MeanCurvatureStep<D>>,
     region: Option<Region<D>>,
     terms: Option<HelfrichTerms<D>>,
@@ -123,7 +129,7 @@ impl<const D: usize> Minimizations<D> {
         problem: &Problem<D>,
         nodes: &Nodes<D>,
     ) -> Result<&mut Prepared<D>, Error> {
-        let is_there = |prepared: &Prepared<D>| prepared.nodes == *nodes;
+        let is_there = |prepared: &Prepared<D>| prepared.serves(problem, nodes);
         let prepared = match self.prepared.take().filter(is_there) {
             Some(prepared) => prepared,
             None => Prepared::new(problem, nodes)?,
@@ -199,12 +205,29 @@ impl<const D: usize> Prepared<D> {
         let region = region.map(|region| Region::new(nodes, region, &problem.device));
         Ok(Self {
             nodes: nodes.clone(),
+            params: problem.params,
+            operator: problem.operator.clone(),
+            energy: (problem.energy, problem.response.to_bits()),
+            nodes_that_move: problem.region.clone(),
             step,
             region,
             terms: problem.terms_on(nodes)?,
             energies: [None, None],
             phase: None,
         })
+    }
+
+    /// Whether it is what such a minimization needs.
+    fn serves(&self, problem: &Problem<D>, nodes: &Nodes<D>) -> bool {
+        let same_region = match (&self.nodes_that_move, &problem.region) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        same_region
+            && self.params == problem.params
+            && Arc::ptr_eq(&self.operator, &problem.operator)
+            && self.energy == (problem.energy, problem.response.to_bits())
+            && self.nodes == *nodes
     }
 
     /// Fits preconditioner and accuracy to a weight of the curvature.

@@ -28,7 +28,7 @@ pub struct Problem<const D: usize> {
     pub region: Option<Arc<NodeSet>>,
     /// The sizes that are held.
     pub held: Held,
-    /// The problem on the grid of half as many cells, where steps begin, if they do; see [`Self::begin_on`].
+    /// The problem on the grid of half as many cells, where steps begin, if they do; see [`Self::begin_on`]. States on bricks do not look at it.
     pub half: Option<Arc<Problem<D>>>,
     /// Where it is computed.
     pub device: ComputeDevice,
@@ -240,7 +240,11 @@ impl<const D: usize> Problem<D> {
     }
 
     /// The state on the bricks near its interface, if it is on bricks.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for a state on another grid.
     pub(crate) fn followed(&self, state: &State<D>) -> Result<State<D>, Error> {
+        self.grid.same_as(state.field.nodes().grid())?;
         match bricks::following(&state.field, self.params.eps)? {
             Some(nodes) => state.on(&nodes),
             None => state.on(state.field.nodes()),

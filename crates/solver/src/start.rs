@@ -113,7 +113,9 @@ fn on_half_grid<const D: usize>(
     from: &State<D>,
     StepTo { size, targets }: StepTo,
 ) -> Result<Option<OnHalfGrid<D>>, Error> {
-    let Some(half) = &problem.half else {
+    // Bricks follow the interface, which the half grid would not.
+    let on_bricks = from.field.nodes().bricks().is_some();
+    let Some(half) = problem.half.as_ref().filter(|_| !on_bricks) else {
         return Ok(None);
     };
     let start = half_state(half, from);

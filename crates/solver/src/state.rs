@@ -189,7 +189,7 @@ mod tests {
         let grid = Grid::centred(128, 2.0).unwrap();
         let ratios = Ratios::of_run(2, 17, grid.spacing(), EPS, grid.spacing().powi(2));
         let network = Shipped::Accurate.find(ratios).unwrap();
-        let operator = SeparableOperator::new(&network, &device).unwrap();
+        let operator = SeparableOperator::<2>::new(&network, &device).unwrap();
         let disc = phase_field(grid, &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap();
         let nodes = bricks::near(&disc, operator.brick_side(), EPS).unwrap();
         let values = disc.values_on(nodes.bricks().unwrap());

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::common::flow::Flow;
 use crate::common::{accurate, device, distance, dot, network, noise, params, passes_taylor_tests};
 use geometry::distance::SignedDistanceExt;
 use geometry::measure::l2_distance;
@@ -11,7 +12,7 @@ use linearize::taylor::halvings;
 use model::{Network, SeparableOperator};
 use solver::{
     Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
-    Precision, StartKind, WillmoreFlow,
+    Precision, StartKind, 
 };
 
 /// Scales with a solver so accurate that only the storage makes a difference.
@@ -45,12 +46,12 @@ fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
     }
 }
 
-fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
-    WillmoreFlow::with_network(&accurate(D), start, params, &device()).unwrap()
+fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
+    Flow::with_network(&accurate(D), start, params, &device()).unwrap()
 }
 
-fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> WillmoreFlow<D> {
-    WillmoreFlow::on_bricks(&accurate(D), start, params, &device()).unwrap()
+fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
+    Flow::on_bricks(&accurate(D), start, params, &device()).unwrap()
 }
 
 /// The L2 difference of both flows after these steps, over how far they went, and the largest relative difference of their energies.
@@ -62,7 +63,7 @@ fn difference<const D: usize>(start: &Field<D>, params: FlowParams, steps: &[f64
 }
 
 fn difference_of<const D: usize>(
-    (whole, few): (&mut WillmoreFlow<D>, &mut WillmoreFlow<D>),
+    (whole, few): (&mut Flow<D>, &mut Flow<D>),
     steps: &[f64],
 ) -> (f64, f64) {
     let start = whole.field().unwrap();
@@ -206,9 +207,9 @@ fn a_step_beyond_the_first_bricks_makes_them_more() {
     let start = cross();
     let params = exact(start.grid());
     let (mut whole, mut few) = (dense(&start, params), bricks(&start, params));
-    let before = few.current().dims();
+    let before = few.state.field.nodes().len();
     let (apart, energies) = difference_of((&mut whole, &mut few), &[8.0 * params.mcf_step]);
-    assert!(few.current().dims() > before, "{before:?}");
+    assert!(few.state.field.nodes().len() > before, "{before:?}");
     // The first phase field had no more than the first bricks.
     assert!(apart < 2e-6 && energies < 1e-5, "{apart:e} {energies:e}");
 }
@@ -217,14 +218,14 @@ fn a_step_beyond_the_first_bricks_makes_them_more() {
 fn the_same_flow_again_and_from_the_middle_has_the_same_bytes() {
     let start = cross();
     let tau = usual(start.grid()).mcf_step;
-    let run = |flow: &mut WillmoreFlow<2>, steps: usize| -> Vec<usize> {
+    let run = |flow: &mut Flow<2>, steps: usize| -> Vec<usize> {
         (0..steps)
             .map(|_| flow.advance(tau).unwrap().newton.hvp)
             .collect()
     };
     let mut flow = bricks(&start, usual(start.grid()));
     let first = run(&mut flow, 3);
-    let state = flow.state().unwrap();
+    let state = flow.state();
     let rest = run(&mut flow, 2);
     let end = flow.field().unwrap();
     println!("{first:?} {rest:?}");
@@ -234,7 +235,7 @@ fn the_same_flow_again_and_from_the_middle_has_the_same_bytes() {
     assert_eq!(again.field().unwrap(), end);
 
     let mut resumed = bricks(&start, usual(start.grid()));
-    resumed.restore(&state).unwrap();
+    resumed.restore(&state);
     assert_eq!(run(&mut resumed, 2), rest);
     assert_eq!(resumed.field().unwrap(), end);
 }
@@ -247,7 +248,7 @@ fn second_order_steps_go_on_bricks_too() {
     let (mut whole, mut few) = (dense(&start, exact(&grid)), bricks(&start, exact(&grid)));
     for _ in 0..3 {
         for flow in [&mut whole, &mut few] {
-            assert!(flow.advance_second_order(tau, |_| true).unwrap().1);
+            assert!(flow.advance_second_order(tau).is_ok());
         }
     }
     let (whole, few) = (whole.field().unwrap(), few.field().unwrap());
@@ -322,7 +323,7 @@ fn what_bricks_cannot_do_is_refused_in_one_line() {
     let grid = Grid::<2>::per_unit(128, 0.75).unwrap();
     let start = field(grid, &Ball::new([0.0, 0.0], 0.2).unwrap());
     let on = |network: &Network, start: &Field<2>| {
-        WillmoreFlow::on_bricks(network, start, usual(start.grid()), &device())
+        Flow::on_bricks(network, start, usual(start.grid()), &device())
     };
     let error = on(&network(), &start).err().unwrap();
     assert!(error.to_string().contains("accurate recipe"), "{error}");
@@ -336,7 +337,7 @@ fn what_bricks_cannot_do_is_refused_in_one_line() {
     assert!(odd.err().unwrap().to_string().contains("bricks of 16"));
 
     let mut flow = bricks(&start, usual(&grid));
-    assert_eq!(flow.begin_on_half_grids(&accurate(2)).unwrap(), 0);
+    assert_eq!(flow.begin_on_half_grids().unwrap(), 0);
     assert_ne!(flow.advance(1e-5).unwrap().start.kind, StartKind::HalfGrid);
     let whole = distance(flow.field().unwrap().values(), start.values());
     assert!(whole > 0.0);

@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
+use crate::common::flow::Flow;
 use crate::common::{accurate, ball, device, network, params, ratios};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::{Calibration, Network, Shipped};
-use solver::{Error, Factors, FlowParams, WillmoreFlow};
+use solver::{Error, Factors, FlowParams, };
 
 /// A radius of the reference experiment, `2^-4 pi`.
 const RADIUS: f64 = 0.19635;
@@ -20,12 +21,12 @@ fn grid(radius: f64) -> Grid<2> {
     Grid::centred(2 * half as usize, half / 64.0).unwrap()
 }
 
-fn flow(network: &Network, start: &Field<2>, calibration: Factors) -> WillmoreFlow<2> {
+fn flow(network: &Network, start: &Field<2>, calibration: Factors) -> Flow<2> {
     let params = FlowParams {
         calibration,
         ..params(start.grid())
     };
-    WillmoreFlow::with_network(network, start, params, &device()).unwrap()
+    Flow::with_network(network, start, params, &device()).unwrap()
 }
 
 /// L2 errors after 1, 8, 16, 32 and 64 steps from a disc (`phase = 1`) or its complement (`-1`).
@@ -89,7 +90,7 @@ fn calibrated_circles_of_the_convergence_test_stay_within_six_thousandths() {
 }
 
 /// The area of a disc (`phase = 1`) or of the hole that its complement leaves (`-1`).
-fn area(flow: &WillmoreFlow<2>, phase: f64) -> f64 {
+fn area(flow: &Flow<2>, phase: f64) -> f64 {
     let u = flow.field().unwrap();
     let inside = zero_set_volume(&u);
     if phase > 0.0 {
@@ -152,7 +153,7 @@ fn circles_without_calibration_move_at_the_predicted_speed() {
             let tau = TAU * (radius / 0.2_f64).powi(4);
             let start = ball(grid(radius + 0.1), radius).map(|u| phase * u);
             let mut flow = flow(&network, &start, Factors::PAPER);
-            let quartic = |flow: &WillmoreFlow<2>| (area(flow, phase) / PI).powi(2);
+            let quartic = |flow: &Flow<2>| (area(flow, phase) / PI).powi(2);
             flow.advance(tau).unwrap();
             let before = quartic(&flow);
             for _ in 0..4 {
@@ -186,7 +187,7 @@ fn energies_of_spheres_are_as_predicted() {
         };
         let start = ball(grid, 0.34);
         let odd = network.odd_part();
-        let mut flow = WillmoreFlow::with_network(&odd, &start, params, &device()).unwrap();
+        let mut flow = Flow::with_network(&odd, &start, params, &device()).unwrap();
         let record = flow.advance(params.mcf_step / 64.0).unwrap();
         let ratio = record.willmore_energy / (8.0 * PI);
         println!("sphere: {ratio:.4}, predicted {expected:.4}");
@@ -221,7 +222,7 @@ fn factors_enter_the_record_and_bad_ones_are_refused() {
                 calibration: Factors { energy, metric },
                 ..params(start.grid())
             };
-            let flow = WillmoreFlow::with_network(&network(), &start, params, &device());
+            let flow = Flow::with_network(&network(), &start, params, &device());
             let error = flow.err().expect("a bad factor");
             assert!(matches!(error, Error::Geometry(_)), "{error}");
             assert!(error.to_string().contains("calibration."), "{error}");

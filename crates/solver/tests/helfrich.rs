@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use crate::common::flow::Flow;
 use crate::common::{
     ball, device, dot, network, network_3d, noise, params, passes_taylor_tests, ratios,
 };
@@ -12,7 +13,7 @@ use geometry::{Field, Grid, ZeroSet};
 use linearize::taylor::halvings;
 use model::{MeanCurvatureOperator, Network, Shipped};
 use solver::{
-    Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision, WillmoreFlow,
+    Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision, 
 };
 
 const ALL: Helfrich = Helfrich {
@@ -131,23 +132,23 @@ fn sizes_of_balls_are_those_of_the_profile() {
     sizes::<3>(&network_3d(), 32);
 }
 
-fn flow<const D: usize>(u: &Field<D>, helfrich: Helfrich) -> WillmoreFlow<D> {
+fn flow<const D: usize>(u: &Field<D>, helfrich: Helfrich) -> Flow<D> {
     flow_by(Shipped::Accurate, u, helfrich)
 }
 
 /// A calibrated flow by a network of either recipe.
-fn flow_by<const D: usize>(recipe: Shipped, u: &Field<D>, helfrich: Helfrich) -> WillmoreFlow<D> {
+fn flow_by<const D: usize>(recipe: Shipped, u: &Field<D>, helfrich: Helfrich) -> Flow<D> {
     let network = recipe.find(ratios(D)).unwrap();
     let calibration = network.calibration().unwrap();
     let mut params = params(u.grid());
     params.calibration = calibration.factors;
     let network = network.odd_part();
-    let mut flow = WillmoreFlow::with_network(&network, u, params, &device()).unwrap();
+    let mut flow = Flow::with_network(&network, u, params, &device()).unwrap();
     flow.set_energy(helfrich, calibration.response()).unwrap();
     flow
 }
 
-fn radius<const D: usize>(flow: &WillmoreFlow<D>) -> f64 {
+fn radius<const D: usize>(flow: &Flow<D>) -> f64 {
     let u = flow.field().unwrap();
     let volume = ZeroSet::of(&u, params(u.grid()).eps).unwrap().volume;
     (volume / ball_volume(D)).powf(1.0 / D as f64)
@@ -215,7 +216,7 @@ fn follows_the_equation<const D: usize>(
         let mut flow = flow(u, helfrich);
         for _ in 0..4 {
             if second {
-                flow.advance_second_order(tau, |_| true).unwrap();
+                flow.advance_second_order(tau).unwrap();
             } else {
                 flow.advance(tau).unwrap();
             }

@@ -1,10 +1,11 @@
 //! Flows in which only some unknowns move.
 
+use crate::common::flow::Flow;
 use crate::common::{ball, device, network, network_3d, params};
 use geometry::shapes::Ball;
 use geometry::{Field, Grid, NodeSet, SignedDistanceExt, measure, phase_field};
 use model::Network;
-use solver::{Error, Exit, WillmoreFlow};
+use solver::{Error, Exit, };
 
 /// A ball without the part beyond a plane through its middle, and a cube around the cut.
 fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, NodeSet) {
@@ -14,8 +15,8 @@ fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, NodeSet) {
     (phase_field(grid, &shape, eps).unwrap(), nodes)
 }
 
-fn flow<const D: usize>(grid: Grid<D>, network: &Network, initial: &Field<D>) -> WillmoreFlow<D> {
-    WillmoreFlow::with_network(network, initial, params(&grid), &device()).unwrap()
+fn flow<const D: usize>(grid: Grid<D>, network: &Network, initial: &Field<D>) -> Flow<D> {
+    Flow::with_network(network, initial, params(&grid), &device()).unwrap()
 }
 
 fn only_the_region_moves<const D: usize>(grid: Grid<D>, network: &Network, tau: f64) {
@@ -82,7 +83,7 @@ fn the_minimizer_is_stationary_inside() {
     let (initial, nodes) = cut(grid, params(&grid).eps);
     let mut parameters = params(&grid);
     parameters.newton.tolerance = 1e-6;
-    let mut flow = WillmoreFlow::with_network(&network(), &initial, parameters, &device()).unwrap();
+    let mut flow = Flow::with_network(&network(), &initial, parameters, &device()).unwrap();
     flow.restrict_to(&nodes).unwrap();
     let tau = grid.spacing().powi(2);
     flow.advance(tau).unwrap();

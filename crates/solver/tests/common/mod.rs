@@ -1,4 +1,6 @@
 //! What the tests share: networks, discs and small objectives on the host.
+pub mod flow;
+
 use burn::tensor::Tensor;
 use geometry::{Field, Grid, phase_field, shapes::Ball};
 use model::training::levenberg_marquardt::heat_kernel;
