@@ -12,13 +12,13 @@ use linearize::dual::{self, Dual};
 use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network, Shipped};
 use operators::{
-    COEFFICIENTS, HermiteTable, HostUpdate, Interpolation, Real, SharedUpdate, SpectralFilter,
-    TableRange, add_scaled, brick_convolution, circular_convolution, extrapolate, inner_product,
-    retract, spectral_filter, tabulated, update_on_host,
+    COEFFICIENTS, ComputeDevice, HermiteTable, HostUpdate, Interpolation, Real, SharedUpdate,
+    SpectralFilter, TableRange, add_scaled, brick_convolution, circular_convolution, extrapolate,
+    inner_product, retract, spectral_filter, tabulated, update_on_host,
 };
 use solver::{
-    Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, StepRecord,
-    WillmoreFlow,
+    Exit, FlowParams, LearnedStep, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective,
+    Problem, State, StepRecord, Stepper,
 };
 use support::{
     Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
@@ -796,13 +796,26 @@ fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
     }
 }
 
+/// Willmore flow with a learned operator.
+fn learned<const D: usize>(
+    network: &Network,
+    grid: &Grid<D>,
+    params: FlowParams,
+    device: &ComputeDevice,
+) -> Problem<D> {
+    let step = LearnedStep::new(network, device).unwrap();
+    Problem::new(step, grid, params, device).unwrap()
+}
+
 /// Two steps, so that the second starts from the extrapolation.
 fn flow<const D: usize>(backend: &Backend, grid: Grid<D>) -> (Field<D>, [StepRecord; 2]) {
     let params = params(&grid);
     let network = splitting_network(D, WIDTH).unwrap();
     let start = ball(grid, 0.3);
-    let mut flow = WillmoreFlow::with_network(&network, &start, params, &backend.device).unwrap();
-    let records = [(); 2].map(|()| flow.advance(params.mcf_step).unwrap());
+    let problem = learned(&network, &grid, params, &backend.device);
+    let start = problem.start(&start).unwrap();
+    let mut flow = Stepper::new(problem, start);
+    let records = [(); 2].map(|()| flow.step(params.mcf_step).unwrap());
     (flow.field().unwrap(), records)
 }
 
@@ -859,11 +872,13 @@ fn steps_on_bricks_are_those_on_the_whole_grid() {
     let start = ball(grid, 0.3);
     for backend in &backends() {
         let device = &backend.device;
-        let whole = WillmoreFlow::with_network(&network, &start, params, device).unwrap();
-        let bricks = WillmoreFlow::on_bricks(&network, &start, params, device).unwrap();
-        assert!(bricks.stored_cells() < grid.len());
-        let step = |mut flow: WillmoreFlow<2>| {
-            flow.advance(params.mcf_step).unwrap();
+        let problem = learned(&network, &grid, params, device);
+        let whole = problem.start(&start).unwrap();
+        let bricks = problem.start_on_bricks(&start).unwrap();
+        assert!(bricks.field.nodes().len() < grid.len());
+        let step = |start: State<2>| {
+            let mut flow = Stepper::new(problem.clone(), start);
+            flow.step(params.mcf_step).unwrap();
             flow.field().unwrap()
         };
         let (whole, bricks) = (step(whole), step(bricks));

@@ -1,6 +1,5 @@
 //! The phase field of a run between two steps.
 
-use std::ops::Deref;
 use std::sync::OnceLock;
 
 use geometry::{Field, NodeSet, Nodes, PhaseField, Stored};
@@ -17,20 +16,12 @@ pub struct Current<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Current<'a, D> {
-    /// It on the whole grid.
-    pub(crate) fn field(&self) -> &'a Field<D> {
+    /// It on the whole grid, which takes the memory of all of it.
+    pub fn field(&self) -> &'a Field<D> {
         self.whole.get_or_init(|| {
             Field::read_from(*self.stored.grid(), &|start, part| self.read(start, part))
                 .expect("stored values are finite")
         })
-    }
-}
-
-impl<const D: usize> Deref for Current<'_, D> {
-    type Target = Field<D>;
-
-    fn deref(&self) -> &Field<D> {
-        self.field()
     }
 }
 

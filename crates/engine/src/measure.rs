@@ -107,7 +107,9 @@ impl<const D: usize> Measure<D> {
     /// Distances from a point to the zero crossings on the ray along the first axis, as `tip`, and on the diagonal, as `diagonal`.
     pub fn crossings(centre: f64) -> Vec<Self> {
         let along = |name: &str, direction: [f64; D]| {
-            Self::new(name, move |u, _| ray_crossing(u, [centre; D], direction))
+            Self::new(name, move |u, _| {
+                ray_crossing(u.field(), [centre; D], direction)
+            })
         };
         let first = std::array::from_fn(|axis| if axis == 0 { 1.0 } else { 0.0 });
         vec![along("tip", first), along("diagonal", [1.0; D])]

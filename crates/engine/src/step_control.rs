@@ -8,7 +8,8 @@ use crate::control::Sizes;
 use crate::steps::{largest_step, least_energy};
 use crate::substeps::{EASY, HARD, Substeps};
 use crate::{
-    Attempts, Case, Controller, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps, Verdict,
+    Attempts, Case, Controller, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps,
+    Verdict,
 };
 
 /// Steps by the energy grow while they take away less than this fraction of it,

@@ -109,7 +109,7 @@ pub enum Order {
     /// As one minimization: implicit Euler, the scheme of the paper.
     #[default]
     First,
-    /// As two minimizations ([`solver::WillmoreFlow::advance_second_order`]).
+    /// As two minimizations ([`solver::SecondOrder`]).
     Second,
     /// In second-order steps whose sizes are controlled; the steps of the rule end when they are due.
     Controlled(ErrorControl),

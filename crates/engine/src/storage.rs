@@ -18,7 +18,7 @@ pub enum Storage {
     /// The whole grid
     #[default]
     Dense,
-    /// Bricks near the surface ([`solver::WillmoreFlow::on_bricks`])
+    /// Bricks near the surface ([`solver::Problem::start_on_bricks`])
     Bricks,
 }
 

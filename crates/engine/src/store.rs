@@ -224,8 +224,8 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>
         "memory": { "fields": fields, "numbers": state.memory.numbers },
     });
     let initial = &run.case.initial;
-    let mut packed = Packed::new(run.records.len() as u64, notes)
-        .with_array("initial", initial.values());
+    let mut packed =
+        Packed::new(run.records.len() as u64, notes).with_array("initial", initial.values());
     if let Some(marks) = marks(initial.nodes()) {
         packed = packed.with_array(&bricks_of("initial"), marks);
     }

@@ -2,13 +2,13 @@
 //!
 //! The nested scheme of Franken, Rumpf and Wirth puts a finite-element step of mean curvature flow into the
 //! minimizing-movement energy; [`FiniteElementStep`] is that step, fully implicit or semi-implicit, and
-//! [`solver::WillmoreFlow`] does the rest with the same Newton method as for the learned operator:
+//! [`solver::Euler`] does the rest with the same Newton method as for the learned operator:
 //!
 //! ```
 //! use fem::FiniteElementStep;
 //! use geometry::{Grid, phase_field, shapes::Ball};
 //! use operators::ComputeDevice;
-//! use solver::{FlowParams, WillmoreFlow};
+//! use solver::{FlowParams, Problem, Stepper};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let grid = Grid::<2>::per_unit(64, 1.0)?;
@@ -16,8 +16,10 @@
 //! let disc = phase_field(grid, &Ball::new([0.0, 0.0], 0.2)?, params.eps)?;
 //! let step = FiniteElementStep::implicit(&grid, params.eps, params.mcf_step)?;
 //! let device = ComputeDevice::default_compiled()?;
-//! let mut flow = WillmoreFlow::new(step.clone(), &disc, params, &device)?;
-//! let record = flow.advance(params.mcf_step)?;
+//! let problem = Problem::new(step.clone(), &grid, params, &device)?;
+//! let start = problem.start(&disc)?;
+//! let mut flow = Stepper::new(problem, start);
+//! let record = flow.step(params.mcf_step)?;
 //! assert!(record.energy < record.energy_before);
 //! println!("w = {:.2}, {:?}", step.willmore_energy(&flow.field()?)?, step.statistics());
 //! # Ok(())

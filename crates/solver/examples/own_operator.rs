@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::{Grid, exact::willmore_radius, phase_field, shapes::Ball};
 use operators::{ComputeDevice, SpectralFilter, spectral_filter};
-use solver::{FlowParams, MeanCurvatureStep, PhaseInverse, WillmoreFlow};
+use solver::{FlowParams, MeanCurvatureStep, PhaseInverse, Problem, Stepper};
 
 /// `v = u + tautilde (Laplace u + 2 a^2 (u - u^3))`, whose profile `tanh(a d)` is that of this project for `a = 3 / (4 eps)`.
 struct AllenCahn {
@@ -61,9 +61,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         a: 0.75 / params.eps,
     };
     let disc = phase_field(grid, &Ball::<2>::new([0.0, 0.0], 0.2)?, params.eps)?;
-    let mut flow = WillmoreFlow::new(own, &disc, params, &ComputeDevice::default_compiled()?)?;
+    let problem = Problem::new(own, &grid, params, &ComputeDevice::default_compiled()?)?;
+    let start = problem.start(&disc)?;
+    let mut flow = Stepper::new(problem, start);
     for _ in 0..4 {
-        let step = flow.advance(2.0_f64.powi(-14))?;
+        let step = flow.step(2.0_f64.powi(-14))?;
         let radius =
             (geometry::measure::zero_set_volume(&flow.field()?) / std::f64::consts::PI).sqrt();
         let exact = willmore_radius(0.2, step.time, 2);

@@ -92,50 +92,52 @@ fn replaced<const D: usize>(
     Ok((next != *bricks).then(|| nodes(next)))
 }
 
-    /// For every place of a brick, whether a cell there is within `reach` of one beside a change of sign; which bricks are stored does not matter.
-    fn reached<const D: usize>(bricks: &Bricks<D>, nodes: &Nodes<D>, u: &[f64], reach: f64) -> Vec<bool> {
-        let (side, per_axis) = (bricks.side(), bricks.per_axis());
-        let mut cells_of = vec![Vec::new(); per_axis.pow(D as u32)];
-        for place in interface(nodes, u) {
-            let brick = bricks.flat(place.map(|at| at / side));
-            cells_of[brick].push(place.map(|at| (at % side) as i64));
-        }
-        let reach = reach / nodes.grid().spacing();
-        let furthest = (reach / side as f64).floor() as i64 + 1;
-        let offsets = 2 * furthest + 1;
-        let holders = (0..cells_of.len()).filter(|&brick| !cells_of[brick].is_empty());
-        let holders: Vec<usize> = holders.collect();
-        let offset = |mut number: i64| -> [i64; D] {
-            std::array::from_fn(|_| {
-                let offset = number % offsets - furthest;
-                number /= offsets;
-                offset
-            })
-        };
-        let reached = parallel::map(holders.len(), 1, &|holder| -> Vec<usize> {
-            let (cells, place) = (
-                &cells_of[holders[holder]],
-                bricks.place(holders[holder]),
-            );
-            (0..offsets.pow(D as u32))
-                .map(offset)
-                .filter(|offset| {
-                    let mut cells = cells.iter();
-                    cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
-                })
-                .map(|offset| {
-                    bricks.flat(std::array::from_fn(|axis| {
-                        (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
-                    }))
-                })
-                .collect()
-        });
-        let mut near = vec![false; cells_of.len()];
-        for brick in reached.into_iter().flatten() {
-            near[brick] = true;
-        }
-        near
+/// For every place of a brick, whether a cell there is within `reach` of one beside a change of sign; which bricks are stored does not matter.
+fn reached<const D: usize>(
+    bricks: &Bricks<D>,
+    nodes: &Nodes<D>,
+    u: &[f64],
+    reach: f64,
+) -> Vec<bool> {
+    let (side, per_axis) = (bricks.side(), bricks.per_axis());
+    let mut cells_of = vec![Vec::new(); per_axis.pow(D as u32)];
+    for place in interface(nodes, u) {
+        let brick = bricks.flat(place.map(|at| at / side));
+        cells_of[brick].push(place.map(|at| (at % side) as i64));
     }
+    let reach = reach / nodes.grid().spacing();
+    let furthest = (reach / side as f64).floor() as i64 + 1;
+    let offsets = 2 * furthest + 1;
+    let holders = (0..cells_of.len()).filter(|&brick| !cells_of[brick].is_empty());
+    let holders: Vec<usize> = holders.collect();
+    let offset = |mut number: i64| -> [i64; D] {
+        std::array::from_fn(|_| {
+            let offset = number % offsets - furthest;
+            number /= offsets;
+            offset
+        })
+    };
+    let reached = parallel::map(holders.len(), 1, &|holder| -> Vec<usize> {
+        let (cells, place) = (&cells_of[holders[holder]], bricks.place(holders[holder]));
+        (0..offsets.pow(D as u32))
+            .map(offset)
+            .filter(|offset| {
+                let mut cells = cells.iter();
+                cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
+            })
+            .map(|offset| {
+                bricks.flat(std::array::from_fn(|axis| {
+                    (place[axis] as i64 + offset[axis]).rem_euclid(per_axis as i64) as usize
+                }))
+            })
+            .collect()
+    });
+    let mut near = vec![false; cells_of.len()];
+    for brick in reached.into_iter().flatten() {
+        near[brick] = true;
+    }
+    near
+}
 
 /// The square of the distance of a cell to the nearest one of the brick that is so many bricks away.
 fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 {

@@ -18,9 +18,9 @@ use operators::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{DeviceField, Error};
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
 use crate::region::Region;
+use crate::{DeviceField, Error};
 
 /// How exactly targets are met in the end, relative to them, in double precision.
 const TOLERANCE: f64 = 1e-12;

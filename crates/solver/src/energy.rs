@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor};
-use linearize::{Graph, Linearization, Value};
 use geometry::Nodes;
+use linearize::{Graph, Linearization, Value};
 use model::{BrickOperator, Factors, MeanCurvatureOperator};
 use operators::{ComputeDevice, spectral_filter};
 

@@ -58,7 +58,9 @@ impl<const D: usize> Euler<D> {
             fields: start.half_motions,
             ..Memory::default()
         };
-        memory.fields.insert(PREVIOUS.to_owned(), from.field.clone());
+        memory
+            .fields
+            .insert(PREVIOUS.to_owned(), from.field.clone());
         memory.numbers.insert(PREVIOUS_TAU.to_owned(), size.tau);
         let state = at.after(minimum.u, memory);
         let made = Some(made);

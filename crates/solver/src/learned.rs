@@ -44,7 +44,9 @@ impl<const D: usize> MeanCurvatureStep<D> for LearnedStep<D> {
     }
 
     fn rests(&self) -> [f64; 2] {
-        self.separable.as_ref().map_or([-1.0, 1.0], SeparableOperator::rests)
+        self.separable
+            .as_ref()
+            .map_or([-1.0, 1.0], SeparableOperator::rests)
     }
 
     fn brick_side(&self) -> Option<usize> {
@@ -53,7 +55,9 @@ impl<const D: usize> MeanCurvatureStep<D> for LearnedStep<D> {
 
     fn on(&self, nodes: &Nodes<D>) -> Result<Arc<dyn MeanCurvatureStep<D>>, StepFailure> {
         let separable = self.separable.as_ref().expect("asked before");
-        Ok(Arc::new(separable.on(nodes.bricks().expect("bricks"), &self.device)))
+        Ok(Arc::new(
+            separable.on(nodes.bricks().expect("bricks"), &self.device),
+        ))
     }
 
     fn coarser(&self, factors: Factors) -> Result<Option<Coarser<D>>, StepFailure> {

@@ -4,7 +4,7 @@
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};
 //! use model::Shipped;
 //! use operators::ComputeDevice;
-//! use solver::{FlowParams, WillmoreFlow};
+//! use solver::{FlowParams, LearnedStep, Problem, Stepper};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A disc of radius 0.2 grows under Willmore flow: R(t) = (r^4 + 2 t)^(1/4).
@@ -14,14 +14,16 @@
 //! let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 //! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, params.eps);
 //!
-//! let mut flow = WillmoreFlow::with_network(&network, &disc(0.2)?, params, &device)?;
+//! let problem = Problem::new(LearnedStep::new(&network, &device)?, &grid, params, &device)?;
+//! let start = problem.start(&disc(0.2)?)?;
+//! let mut flow = Stepper::new(problem, start);
 //! let tau = params.mcf_step;
 //! for _ in 0..2 {
-//!     let step = flow.advance(tau)?;
+//!     let step = flow.step(tau)?;
 //!     println!("t = {:.2e}: w = {:.3}, {} products", step.time, step.willmore_energy, step.newton.hvp);
 //!     assert!(step.energy < step.energy_before);
 //! }
-//! let exact = disc(willmore_radius(0.2, flow.time(), 2))?;
+//! let exact = disc(willmore_radius(0.2, flow.state.time, 2))?;
 //! assert!(l2_distance(&flow.field()?, &exact)? < 0.007);
 //! # Ok(())
 //! # }
@@ -29,7 +31,7 @@
 //!
 //! [`MinimizingMovement`] is the energy of a step as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its
 //! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`Method::Preconditioned`]), the
-//! constraints ([`WillmoreFlow::constrain`]) and the further terms of the energy ([`WillmoreFlow::set_energy`]) are explained in
+//! held sizes ([`Problem::hold`]) and the further terms of the energy ([`Problem::set_energy`]) are explained in
 //! `docs/algorithm.md`.
 //!
 //! # Conventions
@@ -67,6 +69,7 @@ mod second_order;
 mod sparse;
 mod start;
 mod state;
+mod stepper;
 mod times;
 
 pub use constraints::Constraints;
@@ -76,9 +79,9 @@ pub use error::{Error, StepFailure};
 pub use euler::Euler;
 pub use held::{Held, Target};
 pub use helfrich::{Helfrich, HelfrichTerms};
-pub use model::Factors;
 pub use learned::LearnedStep;
 pub use mean_curvature::MeanCurvature;
+pub use model::Factors;
 pub use movement::{Minimizations, Minimum, Movement};
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
@@ -89,4 +92,5 @@ pub use record::{Start, StartKind, StepRecord};
 pub use scheme::{Candidate, Scheme, StepSize};
 pub use second_order::{SecondOrder, StepEstimates};
 pub use state::{DeviceField, Memory, State};
+pub use stepper::Stepper;
 pub use times::PhaseTimes;

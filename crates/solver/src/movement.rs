@@ -11,8 +11,8 @@ use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, DeviceField, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep, MinimizingMovement,
-    Problem, State, bricks,
+    Accuracy, DeviceField, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep,
+    MinimizingMovement, Problem, State, bricks,
 };
 
 /// One minimization, of `1/2 |s (u - a)|^2` and the weighted energy.

@@ -7,8 +7,7 @@ use geometry::{Field, Grid, NodeSet, Nodes, PhaseField, Stored, require};
 use operators::ComputeDevice;
 
 use crate::{
-    DeviceField, Error, FlowParams, Held, Helfrich, HelfrichTerms, MeanCurvatureStep, State,
-    bricks,
+    DeviceField, Error, FlowParams, Held, Helfrich, HelfrichTerms, MeanCurvatureStep, State, bricks,
 };
 
 /// A flow of phase fields: the step of mean curvature flow inside, the energy, and what may move.

@@ -18,11 +18,7 @@ pub(crate) struct Region<const D: usize> {
 
 impl<const D: usize> Region<D> {
     /// These nodes, for fields that are stored at those.
-    pub(crate) fn new(
-        stored: &Nodes<D>,
-        nodes: &NodeSet,
-        device: &ComputeDevice,
-    ) -> Self {
+    pub(crate) fn new(stored: &Nodes<D>, nodes: &NodeSet, device: &ComputeDevice) -> Self {
         match stored.bricks() {
             Some(bricks) => {
                 let marks = nodes.on(bricks).into();
@@ -35,11 +31,7 @@ impl<const D: usize> Region<D> {
         }
     }
 
-    fn marked(
-        marks: Arc<[bool]>,
-        shape: [usize; D],
-        device: &ComputeDevice,
-    ) -> Self {
+    fn marked(marks: Arc<[bool]>, shape: [usize; D], device: &ComputeDevice) -> Self {
         let values: Vec<f64> = marks.iter().map(|&inside| f64::from(inside)).collect();
         let inside = device.tensor::<D>(&values, shape);
         Self {

@@ -11,11 +11,11 @@ use std::time::Instant;
 use geometry::Stored;
 use serde::{Deserialize, Serialize};
 
+use crate::constraints::Constraints;
 use crate::displacement::{
     curvature_weight, depth, displaced, displacement, metric_weight, on_interface, widths_between,
     window,
 };
-use crate::constraints::Constraints;
 use crate::movement::{Minimizations, Minimum, Movement};
 use crate::record::At;
 use crate::{
@@ -128,8 +128,7 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         )?;
         let after = second.u.stored()?;
 
-        let of_stage =
-            |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / tau);
+        let of_stage = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / tau);
         let rates = [of_stage(&middle, &before), of_stage(&after, &anchor)];
         let made = Made {
             states: [&before, &middle, &after],
@@ -192,11 +191,7 @@ fn factors<const D: usize>(stage: &Stage<'_, D>, long: f64, eps: f64) -> Stored<
 }
 
 /// The displacement in the time `tau` at the rate of the last step, on the interface of the present phase field.
-fn anticipated<const D: usize>(
-    rate: Option<&Stored<D>>,
-    now: &Stored<D>,
-    tau: f64,
-) -> Stored<D> {
+fn anticipated<const D: usize>(rate: Option<&Stored<D>>, now: &Stored<D>, tau: f64) -> Stored<D> {
     match rate {
         Some(rate) => rate.zip_map(now, |rate, u| rate * window(u) * tau),
         None => now.map(|_| 0.0),
@@ -235,21 +230,17 @@ impl<const D: usize> Made<'_, D> {
         // Interface of u_k that is gone in U, and of u_{k+1} that is not yet there, is no part of that in the middle: it is seen from those ends.
         let away = |end| {
             let widths = widths_between(end, middle);
-            if widths > AWAY {
-                widths * eps
-            } else {
-                0.0
-            }
+            if widths > AWAY { widths * eps } else { 0.0 }
         };
         let [gone, new] = [before, after].map(away);
         let error = self.start.map(|start| {
-                let stages = first.zip_map(second, |first, second| {
-                    (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
-                });
-                let error = stages.zip_map(start, |stages, start| {
-                    self.tau * (stages + (1.0 - FIRST - SECOND) * start)
-                });
-                unit * largest(&error, middle)
+            let stages = first.zip_map(second, |first, second| {
+                (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
+            });
+            let error = stages.zip_map(start, |stages, start| {
+                self.tau * (stages + (1.0 - FIRST - SECOND) * start)
+            });
+            unit * largest(&error, middle)
         });
         StepEstimates {
             error,

@@ -65,7 +65,10 @@ pub(crate) fn of<const D: usize>(
         // The first step also relaxes the initial profile, which is nothing to extrapolate.
         Some((previous, last)) if from.step > 1 && moved_little(&from.field, previous)? => {
             let factor = (to.size.tau / last).min(2.0);
-            (extrapolate(current, previous, factor), StartKind::Extrapolated)
+            (
+                extrapolate(current, previous, factor),
+                StartKind::Extrapolated,
+            )
         }
         _ => (current.clone(), StartKind::Rest),
     };
@@ -78,10 +81,7 @@ pub(crate) fn of<const D: usize>(
 
 /// Whether the interface moved by less than half its width, `4 eps/3` in root mean square, since `previous`. After longer
 /// moves an extrapolation can end in the valley of another minimizer, even close a hole.
-fn moved_little<const D: usize>(
-    now: &DeviceField<D>,
-    previous: &Tensor<D>,
-) -> Result<bool, Error> {
+fn moved_little<const D: usize>(now: &DeviceField<D>, previous: &Tensor<D>) -> Result<bool, Error> {
     const FAR: f64 = 0.5;
     let current = now.values();
     let square = |x: &Tensor<D>| now.device().scalar(inner_product(x, x));
@@ -130,7 +130,9 @@ fn on_half_grid<const D: usize>(
         Err(error) if error.shorter_step_may_succeed() => return Ok(None),
         candidate => candidate?,
     };
-    let made = candidate.made.expect("a step of Euler's method has a record");
+    let made = candidate
+        .made
+        .expect("a step of Euler's method has a record");
     let moved = candidate.state.field.values().clone() - start.field.values().clone();
     let moved = start.field.with(moved);
     let mut motions: BTreeMap<String, DeviceField<D>> = BTreeMap::new();

@@ -175,11 +175,11 @@ impl<const D: usize> State<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bricks;
     use geometry::measure::{has_interface, perimeter, touches_side, zero_set_volume};
     use geometry::shapes::Ball;
     use geometry::zero_set::Sizes;
     use geometry::{Grid, ZeroSet, phase_field};
-    use crate::bricks;
     use model::{Ratios, SeparableOperator, Shipped};
 
     const EPS: f64 = 1.0 / 32.0;

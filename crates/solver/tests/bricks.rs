@@ -12,7 +12,7 @@ use linearize::taylor::halvings;
 use model::{Network, SeparableOperator};
 use solver::{
     Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
-    Precision, StartKind, 
+    Precision, StartKind,
 };
 
 /// Scales with a solver so accurate that only the storage makes a difference.

@@ -7,7 +7,7 @@ use crate::common::{accurate, ball, device, network, params, ratios};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
 use model::{Calibration, Network, Shipped};
-use solver::{Error, Factors, FlowParams, };
+use solver::{Error, Factors, FlowParams};
 
 /// A radius of the reference experiment, `2^-4 pi`.
 const RADIUS: f64 = 0.19635;

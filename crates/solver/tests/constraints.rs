@@ -6,7 +6,7 @@ use geometry::shapes::{Ball, Cuboid, Ellipse};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, NodeSet, SignedDistance, ZeroSet, phase_field};
 use model::Shipped;
-use solver::{Constraints, Error, Exit, StepRecord, };
+use solver::{Constraints, Error, Exit, StepRecord};
 
 const BOTH: [bool; 2] = [true, true];
 const PERIMETER: [bool; 2] = [true, false];

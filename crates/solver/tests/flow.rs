@@ -8,9 +8,8 @@ use geometry::{Field, Grid, exact};
 use model::MeanCurvatureOperator;
 use operators::{SpectralFilter, spectral_filter};
 use solver::{
-    DeviceField,
-    Error, Exit, FlowParams, MeanCurvatureStep, Method, MinimizingMovement, NewtonParams,
-    Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, minimize,
+    DeviceField, Error, Exit, FlowParams, MeanCurvatureStep, Method, MinimizingMovement,
+    NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, minimize,
 };
 use std::sync::Arc;
 
@@ -241,8 +240,7 @@ fn a_restored_flow_continues_with_the_same_bytes() {
 fn a_ball_stays_put() {
     let grid = Grid::<3>::per_unit(32, 1.0).unwrap();
     let start = ball(grid, 0.3);
-    let mut flow =
-        Flow::with_network(&network_3d(), &start, params(&grid), &device()).unwrap();
+    let mut flow = Flow::with_network(&network_3d(), &start, params(&grid), &device()).unwrap();
     let record = flow.advance(grid.spacing().powi(2)).unwrap();
     assert_eq!(record.newton.exit, Exit::Converged);
     assert!(record.energy < record.energy_before);
@@ -363,8 +361,7 @@ fn any_step_of_mean_curvature_flow_will_do() {
     let start = ball(grid(), RADIUS);
     let mut params = params(&grid());
     params.newton.tolerance = 1e-6;
-    let mut flow =
-        Flow::new(Pointwise { logarithm: false }, &start, params, &device()).unwrap();
+    let mut flow = Flow::new(Pointwise { logarithm: false }, &start, params, &device()).unwrap();
     let tau = 100.0 * params.mcf_step * params.mcf_step;
     assert!(flow.advance(tau).unwrap().energy > 0.0);
     // Node by node: u - u_0 + 100 (v(u) - u) (v'(u) - 1) = 0.

@@ -12,9 +12,7 @@ use geometry::zero_set::ball_perimeter;
 use geometry::{Field, Grid, ZeroSet};
 use linearize::taylor::halvings;
 use model::{MeanCurvatureOperator, Network, Shipped};
-use solver::{
-    Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision, 
-};
+use solver::{Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision};
 
 const ALL: Helfrich = Helfrich {
     spontaneous_curvature: 3.0,

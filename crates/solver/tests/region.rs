@@ -5,7 +5,7 @@ use crate::common::{ball, device, network, network_3d, params};
 use geometry::shapes::Ball;
 use geometry::{Field, Grid, NodeSet, SignedDistanceExt, measure, phase_field};
 use model::Network;
-use solver::{Error, Exit, };
+use solver::{Error, Exit};
 
 /// A ball without the part beyond a plane through its middle, and a cube around the cut.
 fn cut<const D: usize>(grid: Grid<D>, eps: f64) -> (Field<D>, NodeSet) {

@@ -5,7 +5,7 @@ use crate::common::{accurate, device, params};
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Ellipse, Torus};
 use geometry::{Field, Grid, NodeSet, SignedDistance, phase_field};
-use solver::{Error, FlowParams, NewtonParams, StepRecord, };
+use solver::{Error, FlowParams, NewtonParams, StepRecord};
 
 /// `2^-14`, the time step of the paper's experiments in 2D.
 const UNIT: f64 = 6.103_515_625e-5;

@@ -6,7 +6,7 @@ use geometry::measure::l2_distance;
 use geometry::shapes::Cross;
 use geometry::{Field, Grid, NodeSet, phase_field};
 use model::{Network, Ratios, Shipped};
-use solver::{Error, FlowParams, StartKind, StepRecord, };
+use solver::{Error, FlowParams, StartKind, StepRecord};
 
 const EPS: f64 = 1.0 / 64.0;
 /// Both time steps.
@@ -38,8 +38,7 @@ fn cross() -> Field<2> {
 
 fn flow(half: bool) -> Flow<2> {
     let network = accurate(256, 33);
-    let mut flow =
-        Flow::with_network(&network, &cross(), scales(&network), &device()).unwrap();
+    let mut flow = Flow::with_network(&network, &cross(), scales(&network), &device()).unwrap();
     if half {
         assert_eq!(flow.begin_on_half_grids().unwrap(), 1);
     }
