@@ -79,7 +79,7 @@ pub struct Ensemble {
 impl Ensemble {
     /// Runs `count` circles side by side for so many steps of `2^-14`; those of an interrupted run are in a `folder` of the output.
     pub fn run(
-        (variant, operator): &(Variant, Operator),
+        (variant, operator): &(Variant, Operator<2>),
         (count, steps): (usize, usize),
         folder: &str,
         stage: &Stage<'_>,

@@ -180,7 +180,7 @@ impl Setting {
         &self,
         session: &mut Session,
         what: &str,
-        (variant, operator): (Variant, &Operator),
+        (variant, operator): (Variant, &Operator<2>),
         (steps, ratio): (usize, usize),
         (reference, exact): (Option<&Compared>, &[Truth]),
     ) -> Result<Compared> {

@@ -90,7 +90,7 @@ impl Equilibrium {
         self,
         session: &mut Session,
         (shape, initial): (&str, Field<D>),
-        (operator, mut scales): (Operator, Scales),
+        (operator, mut scales): (Operator<D>, Scales),
         steps: Option<usize>,
     ) -> Result<AtRest<D>> {
         let (initial, eps) = (Stored::from(initial), scales.eps);

@@ -39,7 +39,7 @@ pub struct Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
-    pub fn case(&self, grid: Grid<D>, scales: Scales, operator: &Operator) -> Result<Case<D>> {
+    pub fn case(&self, grid: Grid<D>, scales: Scales, operator: &Operator<D>) -> Result<Case<D>> {
         let [low, high] = self.region;
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         let title = format!("inpainted {}", self.title);
@@ -59,7 +59,7 @@ fn first_substep(eps: f64) -> f64 {
 
 pub fn parameters<const D: usize>(
     (n, scales): (usize, &Scales),
-    operator: &Operator,
+    operator: &Operator<D>,
     shapes: &[Shape<D>],
 ) -> Value {
     json!({

@@ -66,12 +66,16 @@ impl Chosen {
         Ok(self.of(scheme).find(scheme.shipped(), needed)?)
     }
 
-    pub fn learned(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<Operator> {
+    pub fn learned<const D: usize>(
+        &self,
+        scheme: Scheme,
+        needed: &NeededNetwork,
+    ) -> Result<Operator<D>> {
         Ok(Operator::learned(scheme, self.find(scheme, needed)?)?)
     }
 
     /// The operator of a method in a scheme at resolution `n` of the convergence tests.
-    pub fn operator(&self, (method, scheme): (Method, Scheme), n: usize) -> Result<Operator> {
+    pub fn operator(&self, (method, scheme): (Method, Scheme), n: usize) -> Result<Operator<2>> {
         if method.is_learned() {
             return self.learned(scheme, &convergence_network(n)?);
         }
@@ -94,7 +98,7 @@ pub fn convergence_network(n: usize) -> Result<NeededNetwork> {
 
 /// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
 pub fn planar_flow(
-    (flow, operator): (Flow, &Operator),
+    (flow, operator): (Flow, &Operator<2>),
     shape: &str,
     initial: Field<2>,
     (tau, steps): (f64, usize),
@@ -116,7 +120,7 @@ pub fn operator<const D: usize>(
     variant: (Method, Scheme),
     grid: &Grid<D>,
     scales: &Scales,
-) -> Result<Operator> {
+) -> Result<Operator<D>> {
     let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
     Ok(Operator::new(variant, &networks, &needed, grid, scales)?)
 }

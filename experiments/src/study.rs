@@ -104,7 +104,7 @@ impl Variant {
 /// What is compared with what, with all operators.
 pub struct Study {
     pub cells: BTreeSet<usize>,
-    pub plan: Vec<(Variant, Operator)>,
+    pub plan: Vec<(Variant, Operator<2>)>,
     pub networks: Chosen,
 }
 
@@ -138,7 +138,7 @@ impl Study {
 
     /// Checksums of the networks of the variants, for the manifest.
     pub fn checksums(&self) -> BTreeMap<String, String> {
-        let of = |(variant, operator): &(Variant, Operator)| {
+        let of = |(variant, operator): &(Variant, Operator<2>)| {
             Some((variant.key(), operator.network()?.network.fingerprint()))
         };
         self.plan.iter().filter_map(of).collect()
@@ -201,6 +201,7 @@ pub fn colour(method: Method, scheme: Scheme) -> usize {
         (Method::FeImplicit, _) => 4,
         (Method::FeSemi, Scheme::Paper) => 3,
         (Method::FeSemi, _) => 6,
+        (Method::Own, _) => 7,
     }
 }
 

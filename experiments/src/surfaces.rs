@@ -66,7 +66,7 @@ impl Setting {
         })
     }
 
-    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator> {
+    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator<3>> {
         let (networks, needed) = (self.networks.of(variant.1), needed_network());
         let (grid, scales) = (&self.grid, &self.scales);
         let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;

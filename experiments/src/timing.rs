@@ -33,7 +33,7 @@ pub fn networks(options: &NetworkOptions, cells: &[usize]) -> Result<Chosen> {
 }
 
 /// What is timed in the plane: the cross in steps of `2^-14`, or for a smoke test a disc on a small box.
-pub fn plane(operator: &Operator, n: usize, steps: usize, quick: bool) -> Result<Case<2>> {
+pub fn plane(operator: &Operator<2>, n: usize, steps: usize, quick: bool) -> Result<Case<2>> {
     let (shape, initial) = if quick {
         let disc = Ball::new([0.0, 0.0], 0.2)?;
         ("disc", phase_field(Grid::per_unit(n, 0.75)?, &disc, EPS)?)

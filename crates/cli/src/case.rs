@@ -64,7 +64,7 @@ impl SchemeOptions {
         &self,
         method: Method,
         grid: &Grid<D>,
-    ) -> Result<(Scales, Operator)> {
+    ) -> Result<(Scales, Operator<D>)> {
         let scales = Scales::of_grid(grid.spacing(), self.eps_over_h());
         let needed = scales.needs(D, grid.spacing());
         let networks = Networks::load(self.network.as_slice(), &[needed])?;

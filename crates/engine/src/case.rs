@@ -31,7 +31,7 @@ pub struct Case<const D: usize> {
     /// Mean curvature flow or Willmore flow.
     pub flow: Flow,
     /// The step of mean curvature flow, and the weights of the energy.
-    pub operator: Operator,
+    pub operator: Operator<D>,
     /// Interface width, inner time step, and settings of the minimization.
     pub scales: Scales,
     /// Sizes of the time steps. Those of mean curvature flow are the inner step.
@@ -47,7 +47,7 @@ impl<const D: usize> Case<D> {
     pub fn willmore(
         shape: &str,
         initial: impl Into<Stored<D>>,
-        operator: Operator,
+        operator: Operator<D>,
         scales: Scales,
         (steps, count): (impl Into<TimeSteps>, usize),
     ) -> Self {

@@ -21,7 +21,7 @@ pub fn round_edges<const D: usize>(
     start: &Stored<D>,
     sharp: &ZeroSet,
     holds_volume: bool,
-    (scales, operator): (Scales, Operator),
+    (scales, operator): (Scales, Operator<D>),
     device: &ComputeDevice,
 ) -> Result<Option<(Stored<D>, ZeroSet)>, Error> {
     let eps = scales.eps;

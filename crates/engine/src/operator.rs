@@ -8,7 +8,7 @@ use geometry::Grid;
 use model::{Calibration, NamedNetwork, NeededNetwork, Networks, Shipped};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use solver::{Factors, NewtonParams};
+use solver::{Factors, MeanCurvatureStep, NewtonParams};
 
 use crate::{Error, Flow, Storage};
 
@@ -27,6 +27,9 @@ pub enum Method {
     /// Semi-implicit finite elements
     #[cfg_attr(feature = "clap", value(alias = "fe_semi"))]
     FeSemi,
+    /// A step of one's own ([`Operator::own`])
+    #[cfg_attr(feature = "clap", value(skip))]
+    Own,
 }
 
 /// How the energy of a time step of Willmore flow is weighted.
@@ -59,7 +62,7 @@ impl Scheme {
 }
 
 impl Method {
-    /// All methods, in the order of legends.
+    /// All methods of the library, in the order of legends.
     pub const ALL: [Self; 3] = [Self::Hybrid, Self::FeImplicit, Self::FeSemi];
 
     /// Name in legends.
@@ -68,6 +71,7 @@ impl Method {
             Self::Hybrid => "learned operator",
             Self::FeImplicit => "FE implicit",
             Self::FeSemi => "FE semi-implicit",
+            Self::Own => "own operator",
         }
     }
 
@@ -153,8 +157,8 @@ pub fn quarter_square(eps_over_h: f64) -> f64 {
 }
 
 /// The step of mean curvature flow of a case, with the weights of its energy.
-#[derive(Clone, Debug)]
-pub struct Operator {
+#[derive(Clone, derive_more::Debug)]
+pub struct Operator<const D: usize> {
     /// How the step of mean curvature flow is computed.
     pub method: Method,
     /// How the energy is weighted.
@@ -171,9 +175,11 @@ pub struct Operator {
     /// What of the phase field is stored in Willmore flow with a learned operator.
     pub storage: Storage,
     network: Option<Arc<NamedNetwork>>,
+    #[debug("{:?}", own.as_ref().map(|own| own.identity()))]
+    own: Option<Arc<dyn MeanCurvatureStep<D>>>,
 }
 
-impl Operator {
+impl<const D: usize> Operator<D> {
     fn plain(method: Method, scheme: Scheme) -> Self {
         Self {
             method,
@@ -184,6 +190,7 @@ impl Operator {
             half_grids: false,
             storage: Storage::default(),
             network: None,
+            own: None,
         }
     }
 
@@ -205,20 +212,32 @@ impl Operator {
         Ok(operator)
     }
 
+    /// A step of one's own on the whole grid of a case, with its calibration in the calibrated scheme ([`MeanCurvatureStep::calibrate`]).
+    pub fn own(step: impl MeanCurvatureStep<D> + 'static, calibration: Option<&Calibration>) -> Self {
+        let scheme = calibration.map_or(Scheme::Paper, |_| Scheme::Calibrated);
+        let mut operator = Self::plain(Method::Own, scheme);
+        if let Some(calibration) = calibration {
+            operator.calibrate(calibration);
+        }
+        operator.own = Some(Arc::new(step));
+        operator
+    }
+
     /// Finite elements on grids like this one.
     ///
     /// # Errors
     /// [`Error::Fem`] if the scales do not fit the grid, [`Error::Model`] if the step cannot be calibrated.
     ///
     /// # Panics
-    /// If the method is the learned one.
-    pub fn finite_elements<const D: usize>(
+    /// If the method is another one.
+    pub fn finite_elements(
         method: Method,
         scheme: Scheme,
         grid: &Grid<D>,
         scales: &Scales,
     ) -> Result<Self, Error> {
-        assert!(!method.is_learned(), "a learned operator needs a network");
+        let elements = [Method::FeImplicit, Method::FeSemi];
+        assert!(elements.contains(&method), "finite elements are implicit or semi-implicit");
         let mut operator = Self::plain(method, scheme);
         if scheme != Scheme::Paper {
             operator.calibrate(&operator.elements(grid, scales)?.calibrate()?);
@@ -231,7 +250,7 @@ impl Operator {
     }
 
     /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
-    pub fn new<const D: usize>(
+    pub fn new(
         (method, scheme): (Method, Scheme),
         networks: &Networks,
         needed: &NeededNetwork,
@@ -250,9 +269,17 @@ impl Operator {
         self.network.as_deref()
     }
 
+    /// The step of one's own, if it is one.
+    pub fn own_step(&self) -> Option<&Arc<dyn MeanCurvatureStep<D>>> {
+        self.own.as_ref()
+    }
+
     /// Name of method and scheme in legends.
     pub fn label(&self) -> String {
-        self.method.label_in(self.scheme)
+        match &self.own {
+            Some(own) => own.identity().name,
+            None => self.method.label_in(self.scheme),
+        }
     }
 
     /// Name of method and scheme in files and metrics.
@@ -273,13 +300,16 @@ impl Operator {
         if self.linear != LinearSolver::default() {
             identity["linear"] = json!(format!("{:?}", self.linear));
         }
+        if let Some(own) = &self.own {
+            identity["own"] = json!(own.identity());
+        }
         if self.storage != Storage::Dense {
             identity["storage"] = json!(self.storage);
         }
         identity
     }
 
-    pub(crate) fn elements<const D: usize>(
+    pub(crate) fn elements(
         &self,
         grid: &Grid<D>,
         scales: &Scales,
@@ -287,7 +317,7 @@ impl Operator {
         let (eps, step) = (scales.eps, scales.mcf_step);
         Ok(match self.method {
             Method::FeSemi => FiniteElementStep::semi_implicit(grid, eps, step)?,
-            Method::FeImplicit | Method::Hybrid => {
+            Method::FeImplicit | Method::Hybrid | Method::Own => {
                 FiniteElementStep::implicit_with(grid, eps, step, self.linear)?
             }
         })

@@ -37,6 +37,11 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
     fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D>;
 
+    /// Its name and parameters, which resuming compares.
+    fn identity(&self) -> crate::Identity {
+        crate::Identity::new("step", serde_json::json!(null))
+    }
+
     /// The values near -1 and 1 that it keeps.
     fn rests(&self) -> [f64; 2] {
         [-1.0, 1.0]

@@ -86,20 +86,19 @@ pub fn program(options: &Options) -> Result<()> {
         [("cube", 64, 20), ("blob", 128, 8)],
     );
     let networks = timing::networks(&options.networks, planes)?;
-    let learned = |needed| networks.learned(Scheme::Paper, &needed);
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
     let mut session = Session::open("performance", run, parameters)?;
     let mut all = Vec::new();
     let shape = run.either("disc", "cross");
     for &n in planes {
-        let operator = learned(convergence_network(n)?)?;
+        let operator = networks.learned(Scheme::Paper, &convergence_network(n)?)?;
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
         all.push(Measurement::of(shape, &case, &mut session, turns)?);
     }
     let stored = options.storage.measure(&mut session)?;
     for (name, n, steps) in solids {
-        let operator = learned(surfaces::needed_network())?;
+        let operator = networks.learned(Scheme::Paper, &surfaces::needed_network())?;
         let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
         let initial = solid_shape(name, n)?;
         let case = Case::willmore(name, initial, operator, surfaces::scales(n), time);
