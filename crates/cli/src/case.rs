@@ -1,6 +1,6 @@
 //! From options to cases: which device and operator, which time steps, which sizes are held, and when it ends.
 
-use engine::{ErrorControl, Flow, Held, Helfrich, Operator, Storage, Target, TimeSteps};
+use engine::{ErrorControl, Flow, Held, Helfrich, Operator, Own, Storage, Target, TimeSteps};
 use model::{Network, Networks};
 use solver::NewtonParams;
 
@@ -189,6 +189,7 @@ impl RunCommand {
             steps,
             stops: [stops, known.stops].concat(),
             measures,
+            own: Own::default(),
         };
         Ok((case, start.presentation))
     }

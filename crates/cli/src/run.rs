@@ -257,7 +257,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             let page = folder.join(presentation::PAGE);
             format!("results are in {shown}, to look at: {}", page.display())
         });
-        if let Some(stop) = ended {
+        if let Some(stop) = &ended {
             outcome["ended"] = stop.to_string().into();
         }
         outcome["run"] = folder.to_string_lossy().into();

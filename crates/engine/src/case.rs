@@ -11,7 +11,7 @@ use solver::FlowParams;
 
 use crate::storage::{PER_HELD, PER_NODE_OF_ELEMENTS};
 use crate::{
-    Current, Error, Flow, Held, Helfrich, Measure, Method, Operator, Scales, Stop, Storage,
+    Current, Error, Flow, Held, Helfrich, Measure, Method, Operator, Own, Scales, Stop, Storage,
     TimeSteps,
 };
 
@@ -40,6 +40,8 @@ pub struct Case<const D: usize> {
     pub stops: Vec<Stop>,
     /// Functionals of the phase field that are evaluated after every step.
     pub measures: Vec<Measure<D>>,
+    /// Parts that are one's own.
+    pub own: Own<D>,
 }
 
 impl<const D: usize> Case<D> {
@@ -63,6 +65,7 @@ impl<const D: usize> Case<D> {
             steps: steps.into(),
             stops: vec![Stop::Steps(count)],
             measures: Measure::size(scales.eps),
+            own: Own::default(),
         }
     }
 
@@ -164,6 +167,9 @@ impl<const D: usize> Case<D> {
         if !self.held.is_empty() {
             identity["held"] = json!(self.held);
         }
+        let own = self.own.identity(self);
+        let parts = identity.as_object_mut().expect("it is an object");
+        parts.extend(own);
         identity
     }
 }

@@ -9,6 +9,11 @@ use thiserror::Error as ThisError;
 pub enum Error {
     #[error("{case}: step {step}: the controller gave up at a step of size {tau:.1e}")]
     Refused { case: String, step: usize, tau: f64 },
+    #[error(
+        "the scheme {scheme} does not estimate the errors of its steps, so that their sizes cannot be controlled by them: give the sizes, or another \
+         controller"
+    )]
+    NoEstimates { scheme: String },
     /// A time step that failed, with the case that it belongs to.
     #[error("{case}: {source}")]
     Step {

@@ -54,6 +54,7 @@ mod flow;
 mod measure;
 mod observer;
 mod operator;
+mod own;
 mod parts;
 mod record;
 mod run;
@@ -75,6 +76,7 @@ pub use flow::Flow;
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
 pub use operator::{Method, Operator, Scales, Scheme, quarter_square};
+pub use own::{MakeController, MakeScheme, Own};
 pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, total_hvp,
 };
@@ -82,7 +84,7 @@ pub use run::Run;
 pub use solver::{Held, Helfrich, Target};
 pub use step_control::StepControl;
 pub use steps::{Order, StepRule, TimeSteps};
-pub use stop::Stop;
+pub use stop::{Progress, Stop, StopRule};
 pub use storage::Storage;
 pub use store::{Checkpoints, METRICS, Store, TIMINGS, dimension, ended, initial, notes, records};
 pub use trajectory::Trajectory;

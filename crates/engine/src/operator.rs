@@ -213,7 +213,10 @@ impl<const D: usize> Operator<D> {
     }
 
     /// A step of one's own on the whole grid of a case, with its calibration in the calibrated scheme ([`MeanCurvatureStep::calibrate`]).
-    pub fn own(step: impl MeanCurvatureStep<D> + 'static, calibration: Option<&Calibration>) -> Self {
+    pub fn own(
+        step: impl MeanCurvatureStep<D> + 'static,
+        calibration: Option<&Calibration>,
+    ) -> Self {
         let scheme = calibration.map_or(Scheme::Paper, |_| Scheme::Calibrated);
         let mut operator = Self::plain(Method::Own, scheme);
         if let Some(calibration) = calibration {
@@ -237,7 +240,10 @@ impl<const D: usize> Operator<D> {
         scales: &Scales,
     ) -> Result<Self, Error> {
         let elements = [Method::FeImplicit, Method::FeSemi];
-        assert!(elements.contains(&method), "finite elements are implicit or semi-implicit");
+        assert!(
+            elements.contains(&method),
+            "finite elements are implicit or semi-implicit"
+        );
         let mut operator = Self::plain(method, scheme);
         if scheme != Scheme::Paper {
             operator.calibrate(&operator.elements(grid, scales)?.calibrate()?);

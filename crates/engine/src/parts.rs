@@ -73,10 +73,13 @@ fn make<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<Parts<
     if case.flow == Flow::Willmore {
         willmore(case, &mut problem, &start)?;
     }
-    let scheme: Box<dyn Scheme<D>> = match (case.flow, case.steps.order) {
-        (Flow::MeanCurvature, _) => Box::new(MeanCurvature),
-        (Flow::Willmore, Order::First) => Box::new(Euler::new()),
-        (Flow::Willmore, Order::Second | Order::Controlled(_)) => Box::new(SecondOrder::new()),
+    let scheme: Box<dyn Scheme<D>> = match (&case.own.scheme, case.flow, case.steps.order) {
+        (Some(make), ..) => make(),
+        (None, Flow::MeanCurvature, _) => Box::new(MeanCurvature),
+        (None, Flow::Willmore, Order::First) => Box::new(Euler::new()),
+        (None, Flow::Willmore, Order::Second | Order::Controlled(_)) => {
+            Box::new(SecondOrder::new())
+        }
     };
     Ok(Parts {
         problem,

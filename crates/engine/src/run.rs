@@ -69,7 +69,10 @@ impl<const D: usize> Run<D> {
                 |n| n < 1.0,
             )?;
         }
-        let mut controller: Box<dyn Controller<D>> = Box::new(StepControl::new(&case)?);
+        let mut controller: Box<dyn Controller<D>> = match &case.own.controller {
+            Some(make) => make(&case)?,
+            None => Box::new(StepControl::new(&case)?),
+        };
         for record in &records {
             controller.accept(record)?;
         }
@@ -79,6 +82,10 @@ impl<const D: usize> Run<D> {
             scheme,
             elements,
         } = parts::of(&case, device)?;
+        if controller.needs_estimates() && !scheme.estimates() {
+            let scheme = scheme.name().to_owned();
+            return Err(Error::NoEstimates { scheme });
+        }
         let mut run = Self {
             problem,
             scheme,
@@ -213,7 +220,12 @@ impl<const D: usize> Run<D> {
         };
         let driven = !case.held.is_reached(self.state.progress);
         let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
-        stops.find(|stop| stop.holds(&progress)).copied()
+        if let Some(stop) = stops.find(|stop| stop.holds(&progress)) {
+            return Some(stop.clone());
+        }
+        let mut own = (case.own.stops.iter()).filter(|rule| !(driven && rule.is_rest()));
+        let rule = own.find(|rule| rule.holds(&progress))?;
+        Some(Stop::Own(rule.name().to_owned()))
     }
 
     /// The identity of the case, which takes all of its initial values.
@@ -260,7 +272,7 @@ impl<const D: usize> Run<D> {
 
     /// The stop rule that ended the run, if it is over.
     pub fn ended(&self) -> Option<Stop> {
-        self.ended
+        self.ended.clone()
     }
 
     /// Number of completed time steps.

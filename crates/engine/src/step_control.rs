@@ -273,7 +273,7 @@ impl<const D: usize> Controller<D> for StepControl {
     }
 
     fn needs_estimates(&self) -> bool {
-        self.controller.is_some()
+        matches!(self.steps.order, Order::Controlled(_))
     }
 }
 

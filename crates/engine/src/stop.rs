@@ -12,7 +12,7 @@ use crate::steps::{largest_step, least_energy};
 use crate::{Current, DISPLACEMENT, Record};
 
 /// A reason to end; a flow ends with the first that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Display, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Display, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// This many time steps are made.
@@ -52,17 +52,38 @@ pub enum Stop {
     /// in the beginning.
     #[display("the shape has come to the side of the box, near to its own periodic image")]
     AtTheSide,
+    /// A [rule of one's own](StopRule), by its name.
+    #[display("the rule {_0} holds")]
+    Own(String),
+}
+
+/// A rule that ends a flow.
+pub trait StopRule<const D: usize>: Send + Sync {
+    /// Its name, which the run says when it ends, and which resuming compares; with parameters it includes them.
+    fn name(&self) -> &str;
+
+    /// Whether the flow ends here. It is asked at the start and after every step, and depends on nothing else, so that a run that is resumed ends where it
+    /// would have ended.
+    fn holds(&self, progress: &Progress<'_, D>) -> bool;
+
+    /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
+    fn is_rest(&self) -> bool {
+        false
+    }
 }
 
 /// What the rules look at: a flow at its start or after a step.
-pub(crate) struct Progress<'a, const D: usize> {
-    pub(crate) records: &'a [Record],
-    pub(crate) initial: &'a Stored<D>,
-    pub(crate) current: Current<'a, D>,
+pub struct Progress<'a, const D: usize> {
+    /// The records so far.
+    pub records: &'a [Record],
+    /// The initial phase field.
+    pub initial: &'a Stored<D>,
+    /// The phase field now.
+    pub current: Current<'a, D>,
     /// Number of completed time steps.
-    pub(crate) steps: usize,
+    pub steps: usize,
     /// Whether the energy is the bending energy alone.
-    pub(crate) is_willmore: bool,
+    pub is_willmore: bool,
 }
 
 /// A step that lowers the energy by less than this fraction counts as almost nothing.
@@ -89,6 +110,8 @@ impl Stop {
         let last = flow.records.last();
         let energy = last.and_then(Record::willmore_energy);
         match *self {
+            // It is asked itself.
+            Self::Own(_) => false,
             Self::Steps(steps) => flow.steps >= steps,
             // What is left of a sum of steps after the last one is rounding.
             Self::Time(end) => last.is_some_and(|r| end - r.time <= 1e-12 * end),
