@@ -1,9 +1,11 @@
 //! The list of the experiments, and what follows from it.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
 use experiments::derived;
+use experiments::experiment::Experiment;
 use experiments::programs::EXPERIMENTS;
 
 /// Lists the experiments: `cargo run -p experiments --bin NAME` runs one.
@@ -31,24 +33,25 @@ fn main() -> ExitCode {
 
 fn program(options: &Options) -> experiments::Result<()> {
     let root = derived::root();
+    let mut lines = Vec::new();
     if options.write {
         for (path, text) in derived::files(&root, EXPERIMENTS)? {
             if std::fs::read_to_string(&path).is_ok_and(|old| old == text) {
                 continue;
             }
             std::fs::write(&path, text).map_err(files::Error::of("write", &path))?;
-            println!("{}", path.display());
+            lines.push(path.display().to_string());
         }
     } else if options.results {
-        for run in derived::runs(&root, EXPERIMENTS) {
-            println!("{run}");
-        }
+        lines = derived::runs(&root, EXPERIMENTS);
     } else {
         let names = EXPERIMENTS.iter().map(|experiment| experiment.name.len());
         let width = names.max().unwrap_or(0);
-        for experiment in EXPERIMENTS {
-            println!("{:width$}  {}", experiment.name, experiment.summary);
-        }
+        let line = |one: &&Experiment| format!("{:width$}  {}", one.name, one.summary);
+        lines = EXPERIMENTS.iter().map(line).collect();
     }
+    lines.push(String::new());
+    // A closed pipe (`| head`) is no failure.
+    let _ = std::io::stdout().write_all(lines.join("\n").as_bytes());
     Ok(())
 }

@@ -51,7 +51,10 @@ const METRICS: MetricTable = MetricTable {
     title: "Costs of a step",
     note: "On a GPU, which computes while the host goes on, the time of a single product is not measured.",
     words: &[
-        ("CASE", "`cross`, `cube`, `blob`, `armadillo`"),
+        (
+            "CASE",
+            "`cross`, `disc` in quick runs, `cube`, `blob`, `armadillo`",
+        ),
         (
             "STORAGE",
             "`dense`, the whole grid; `bricks`, what is near the surface",
