@@ -3,12 +3,89 @@
 use geometry::measure::perimeter;
 
 use crate::prelude::*;
-use crate::truth::{self, CELLS, Reached, Sample, Truth};
+use crate::truth::{CELLS, Reached, Sample, Truth};
+
+/// The figures of every shape.
+pub const FIGURES: Figures = &[
+    (
+        "shapes",
+        "The curve at the times that the paper shows; orange: the reference.",
+    ),
+    (
+        "errors",
+        "L² distance to the reference, and distance to the exact flow, against time.",
+    ),
+];
+
+/// What is said about every shape.
+pub const METRICS: MetricTable = MetricTable {
+    title: "Cross and rectangle",
+    note: "",
+    words: &[METHOD],
+    rows: &[
+        ("SHAPE.nN.METHOD.l2.stepK", "L2 distance to the reference"),
+        (
+            "SHAPE.nN.METHOD.tip.stepK, SHAPE.nN.METHOD.diagonal.stepK",
+            "distance from the centre to the zero crossing on the positive x axis, on the diagonal",
+        ),
+        (
+            "SHAPE.nN.METHOD.area.stepK, SHAPE.nN.METHOD.perimeter.stepK",
+            "area of `{u > 0}`, perimeter `P_eps`",
+        ),
+        (
+            "SHAPE.nN.METHOD.energy.stepK",
+            "energy `e[u_(k-1), u_k]` that the step minimized",
+        ),
+        (
+            "SHAPE.nN.METHOD.hvp_per_step, SHAPE.nN.METHOD.newton_per_step, SHAPE.nN.METHOD.energy_increases",
+            "as for circles; steps in which the energy of the step rose",
+        ),
+        ("SHAPE.nN.METHOD.seconds", "wall time of all steps"),
+        (
+            "SHAPE.reference.n, SHAPE.reference.seconds",
+            "cells per unit length and wall time of the reference, implicit finite elements",
+        ),
+        (
+            "SHAPE.reference.l2_to_half_n",
+            "largest L2 distance of the reference to the same run with half as many cells",
+        ),
+        (
+            "SHAPE.nN.METHOD.distance_to_exact.stepK, SHAPE.reference.distance_to_exact.stepK",
+            "largest distance of the zero level from the exact curve",
+        ),
+        (
+            "SHAPE.exact.tip.stepK, SHAPE.exact.diagonal.stepK, SHAPE.exact.area.stepK, SHAPE.exact.perimeter.stepK, \
+             SHAPE.exact.w.stepK",
+            "of the exact curve at `t = K 2^-14`: the extents, area, length and Willmore energy",
+        ),
+        (
+            "SHAPE.nN.controlled.tip.stepK, SHAPE.nN.controlled.diagonal.stepK, SHAPE.nN.controlled.area.stepK, \
+             SHAPE.nN.controlled.perimeter.stepK, SHAPE.nN.controlled.w.stepK",
+            "the same of the zero set by coarea sums, from controlled steps of second order with the accurate \
+             operator, `eps = 2/N`",
+        ),
+        (
+            "SHAPE.nN.controlled.distance_to_exact.stepK, SHAPE.nN.controlled.hvp_total.stepK, \
+             SHAPE.nN.controlled.steps.stepK, SHAPE.nN.controlled.estimated_error.stepK",
+            "its largest distance from the exact curve, its Hessian-vector products and time steps so far, and their \
+             estimated time error",
+        ),
+        (
+            "SHAPE.extrapolated.tip.stepK, SHAPE.extrapolated.diagonal.stepK, SHAPE.extrapolated.area.stepK, \
+             SHAPE.extrapolated.perimeter.stepK, SHAPE.extrapolated.w.stepK, \
+             SHAPE.extrapolated.distance_to_exact.stepK, SHAPE.extrapolated.hvp_total.stepK, \
+             SHAPE.extrapolated.steps.stepK, SHAPE.extrapolated.estimated_error.stepK",
+            "the same extrapolated to `eps = 0` from strictly controlled runs with `eps = 1/64` and `1/128`, four \
+             cells to each; the work is that of both",
+        ),
+    ],
+};
 
 pub struct Setting {
-    /// Name of the program and its folder, and prefix of the metrics.
+    /// Name of the experiment, and prefix of the metrics.
     pub program: &'static str,
     pub title: &'static str,
+    /// The help.
     pub about: &'static str,
     /// Name of the shape with its measures.
     pub shape: &'static str,
@@ -22,42 +99,6 @@ pub struct Setting {
 
 /// Time steps of `2^-14`.
 const STEPS: usize = 128;
-
-pub const CROSS: Setting = Setting {
-    program: "cross",
-    title: "Willmore flow of a cross",
-    about: "Willmore flow of a non-convex cross, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods and resolutions \
-            (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit finite-element run, and shapes",
-    shape: "cross [-.8,.8] x [-.27,.27]",
-    sample: truth::CROSS,
-    flow: Flow::Willmore,
-    shown: &[0, 32, 64, 96, 128],
-    reference_ratio: 1,
-    window: 0.95,
-};
-
-pub const MCF_CROSS: Setting = Setting {
-    program: "mcf_cross",
-    title: "Mean curvature flow of a cross",
-    about: "Mean curvature flow of a non-convex cross, eps = 2^-6, tautilde = 2^-14, until t = 2^-7, by all methods and resolutions: \
-            L2 distance to a finer implicit finite-element run with time step 2^-16, and shapes",
-    flow: Flow::MeanCurvature,
-    shown: &[0, 64, 128],
-    reference_ratio: 4,
-    ..CROSS
-};
-
-pub const RECTANGLE: Setting = Setting {
-    program: "rectangle",
-    title: "Willmore flow of a rectangle",
-    about: "Willmore flow of a rectangle with sides 0.4 and 0.2, eps = 2^-6, tau = tautilde = 2^-14, until t = 2^-7, by all methods \
-            and resolutions (finite elements from n = 256 on, where they are stable): L2 distance to a finer implicit \
-            finite-element run, and shapes",
-    shape: "rectangle 0.4 x 0.2",
-    sample: truth::RECTANGLE,
-    window: 0.5,
-    ..CROSS
-};
 
 /// The options of a comparison. Runs are kept in the folder `fields` of the output; an interrupted one continues.
 #[derive(Parser, Debug)]
@@ -75,10 +116,9 @@ struct Options {
     steps: Option<usize>,
 }
 
-pub fn main(setting: &Setting) -> ExitCode {
-    harness::named(setting.program, setting.about, |options| {
-        run(setting, options)
-    })
+/// Runs an experiment with these settings.
+pub fn run(own: &Experiment, setting: &Setting) -> ExitCode {
+    own.run_with_help(setting.about, |options| compare(setting, options))
 }
 
 const MEASURES: [&str; 4] = ["tip", "diagonal", "perimeter", "area"];
@@ -106,7 +146,7 @@ struct Comparison<'a> {
     second_order: Vec<(String, Vec<Reached>)>,
 }
 
-fn run(setting: &Setting, options: &Options) -> Result<()> {
+fn compare(setting: &Setting, options: &Options) -> Result<()> {
     let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
     let usual = if quick { finest } else { 2 * finest };

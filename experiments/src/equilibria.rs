@@ -7,6 +7,56 @@ use reference::equilibria::Branch;
 use crate::prelude::*;
 use crate::truth::nearest;
 
+/// What is said about vesicles and elastic curves.
+pub const METRICS: MetricTable = MetricTable {
+    title: "Equilibria",
+    note: "",
+    words: &[(
+        "BRANCH",
+        "`prolate`, `oblate`, `stomatocyte`: the branches of vesicles",
+    )],
+    rows: &[
+        (
+            "vesicles.BRANCH.vN.w_over_8pi, vesicles.BRANCH.vN.exact",
+            "Willmore energy at rest over that of a sphere, by coarea sums, and of the exact vesicle with the reduced \
+             volume N",
+        ),
+        (
+            "vesicles.crossing.prolate_oblate, vesicles.crossing.exact",
+            "reduced volume at which prolate and oblate shapes have the same energy, by straight lines between the \
+             reduced volumes of both; the same of the exact vesicles",
+        ),
+        (
+            "vesicles.BRANCH.vN.area_drift, vesicles.BRANCH.vN.volume_drift",
+            "largest relative distance of area and volume from their targets, from the end of the ramp on",
+        ),
+        (
+            "elastica.qN.w_over_circle, elastica.qN.exact",
+            "energy at rest over that of the circle with the same length, and of the exact curve with the \
+             isoperimetric quotient N",
+        ),
+        (
+            "elastica.qN.length_drift, elastica.qN.area_drift",
+            "as for vesicles",
+        ),
+        (
+            "vesicles.BRANCH.vN.tension, vesicles.BRANCH.vN.exact_tension, elastica.qN.tension, \
+             elastica.qN.exact_tension",
+            "multiplier of the perimeter: minus the derivative of the energy by it",
+        ),
+        (
+            "vesicles.BRANCH.vN.pressure, vesicles.BRANCH.vN.exact_pressure, elastica.qN.pressure, \
+             elastica.qN.exact_pressure",
+            "multiplier of the volume, likewise",
+        ),
+        (
+            "vesicles.BRANCH.vN.steps, vesicles.BRANCH.vN.hvp_total, vesicles.BRANCH.vN.seconds, elastica.qN.steps, \
+             elastica.qN.hvp_total, elastica.qN.seconds",
+            "time steps, Hessian-vector products and wall time until rest",
+        ),
+    ],
+};
+
 /// Steps in which the sizes of the start go to the given ones, and the most steps until rest.
 const RAMP: usize = 8;
 const MOST: usize = 200;

@@ -5,32 +5,17 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use clap::Parser;
+use clap::{Command, Parser};
 use operators::{ComputeDevice, memory};
 
 use crate::Result;
 
-/// Runs a program with the options of the command line.
-pub fn main<O: Parser>(program: impl FnOnce(&O) -> Result<()>) -> ExitCode {
-    let options = O::parse();
-    run(|| program(&options))
-}
-
-/// The same for a program of this name with this help, whose options others have, too.
-pub fn named<O: Parser>(
-    name: &'static str,
-    about: &'static str,
-    program: impl FnOnce(&O) -> Result<()>,
-) -> ExitCode {
-    let matches = O::command().name(name).about(about).get_matches();
+/// Runs a program with the options of the command line: success is exit code 0, a failure one line on standard error and exit code 2.
+pub fn main<O: Parser>(command: Command, program: impl FnOnce(&O) -> Result<()>) -> ExitCode {
+    let matches = command.get_matches();
     let options = O::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    run(|| program(&options))
-}
-
-/// Runs a program: success is exit code 0, a failure one line on standard error and exit code 2.
-fn run(program: impl FnOnce() -> Result<()>) -> ExitCode {
     memory::keep_freed();
-    match program() {
+    match program(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", files::with_causes(&*error));

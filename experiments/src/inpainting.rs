@@ -4,6 +4,37 @@ use report::Rgb;
 
 use crate::prelude::*;
 
+/// What is said about inpainting.
+pub const METRICS: MetricTable = MetricTable {
+    title: "Inpainting",
+    note: "",
+    words: &[],
+    rows: &[
+        (
+            "SHAPE.distance.stepK",
+            "L2 distance to the whole disk or ball; for the cross and the tubes to the initial shape",
+        ),
+        (
+            "SHAPE.changed_outside",
+            "nodes outside the region whose bits changed; 0 is right",
+        ),
+        ("SHAPE.steps", "time steps until the shape was stationary"),
+        (
+            "SHAPE.still_from",
+            "time, in the paper's steps, from which on the shape is stationary",
+        ),
+        (
+            "SHAPE.parts_of_step1",
+            "substeps into which the first step was divided",
+        ),
+        ("SHAPE.hvp_per_part", "Hessian-vector products per substep"),
+        (
+            "SHAPE.energy_increases, SHAPE.seconds",
+            "substeps in which the energy rose, wall time of all of them",
+        ),
+    ],
+};
+
 /// A shape is stationary once it moves by less than this part of the way it has come per step.
 const STILL: f64 = 1e-5;
 /// The first substep of the first step, in units of `eps^4`: the time in which a corner becomes about as round as the interface is wide.

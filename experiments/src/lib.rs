@@ -1,8 +1,9 @@
 //! The harness of the experiments: options, errors, stored partial results, and the runs themselves.
 //!
-//! The [`programs`] read options, call what is here, and write figures, tables and summaries with the `report` crate; the
-//! executables only call them. Numerics live in the library crates; here are comparisons: with exact solutions, finer runs,
-//! other smoothing, and products written by hand.
+//! Every [experiment](experiment::Experiment) is a file of [`programs`], which reads options, calls what is here, and writes figures,
+//! tables and summaries with the `report` crate; the executables, the page of results and the tables of metrics are
+//! [derived] from the list. Numerics live in the library crates; here are comparisons: with exact solutions, finer runs, other
+//! smoothing, and products written by hand.
 //!
 //! # Conventions
 //!
@@ -16,11 +17,14 @@
 
 pub mod circles;
 pub mod comparison;
+pub mod derived;
 pub mod equilibria;
+pub mod experiment;
 pub mod harness;
 pub mod inpainting;
 pub mod mesh_flow;
 pub mod meshes;
+pub mod metrics;
 pub mod networks;
 pub mod options;
 pub mod prelude;

@@ -1,74 +1,25 @@
 //! A mesh of the paper under Willmore flow by several schemes.
 
-use geometry::CliffordTorus;
-use render::Tube;
-
-use crate::meshes::{self, KnownMesh, MeshOptions};
+use crate::meshes::{KnownMesh, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, View, energy_by_elements};
+use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, View};
 
 /// A program: a mesh, and how it flows there.
 pub struct MeshFlow {
-    /// Name of the program, its folder and its metrics.
-    program: &'static str,
-    about: &'static str,
-    mesh: KnownMesh,
-    cells: usize,
-    steps: usize,
-    tau: StepRule,
+    /// Name of the experiment, and prefix of the metrics.
+    pub program: &'static str,
+    /// The help.
+    pub about: &'static str,
+    pub mesh: KnownMesh,
+    pub cells: usize,
+    pub steps: usize,
+    pub tau: StepRule,
     /// Steps to be shown, with the energies that the paper reports.
-    shown: &'static [(usize, Option<f64>)],
-    view: View,
+    pub shown: &'static [(usize, Option<f64>)],
+    pub view: View,
     /// Looks at the flows and says what else the note should say, see [`Setting::run`].
-    remarks: fn(&mut Session, &mut [Flowed]) -> Result<String>,
+    pub remarks: fn(&mut Session, &mut [Flowed]) -> Result<String>,
 }
-
-pub const ARMADILLO_FLOW: MeshFlow = MeshFlow {
-    program: "armadillo",
-    about: "Willmore flow of the armadillo, n = 128, eps = 2^-6, tautilde = 2^-14, with tau = 2^-22 doubled after every step: pictures \
-            and Willmore energies at steps 0, 1, 8, 11 and 16",
-    mesh: meshes::ARMADILLO,
-    cells: 128,
-    steps: 16,
-    tau: StepRule::Doubling(1.0 / 4_194_304.0),
-    shown: &[(0, None), (1, None), (8, None), (11, None), (16, None)],
-    view: View {
-        up: UpAxis::Y,
-        azimuth: 205.0,
-        elevation: 8.0,
-    },
-    remarks: |_, _| Ok(String::new()),
-};
-
-pub const ROCKER_ARM_FLOW: MeshFlow = MeshFlow {
-    program: "rocker_arm",
-    about: "Willmore flow of the rocker arm, n = 64, eps = 2^-5, tau = tautilde = 2^-12: pictures and Willmore energies at steps 0, 1 \
-            and 20, and the Clifford torus whose phase field is nearest to the last one in L2",
-    mesh: KnownMesh {
-        file: "rocker-arm.obj",
-        title: "rocker arm",
-        side_length: 1.0,
-        box_side: 1.25,
-        procedural: surfaces::samples::lever,
-        procedural_title: "built-in lever",
-    },
-    cells: 64,
-    steps: 20,
-    tau: StepRule::Constant(1.0 / 4096.0),
-    shown: &[(0, Some(276.12)), (1, Some(42.08)), (20, Some(41.46))],
-    view: View {
-        up: UpAxis::Z,
-        azimuth: 20.0,
-        elevation: 20.0,
-    },
-    remarks: clifford_tori,
-};
-
-/// What the paper reports for the torus: its distance and its energy.
-const PAPERS_L2: f64 = 3.978e-2;
-const PAPERS_CLIFFORD: f64 = 41.11;
-/// Circles drawn on the torus, and points of each.
-const CIRCLES: (usize, usize) = (12, 96);
 
 #[derive(Parser, Debug)]
 #[command(version)]
@@ -92,12 +43,13 @@ struct Options {
     up: Option<UpAxis>,
 }
 
-pub fn main(flow: &MeshFlow) -> ExitCode {
-    harness::named(flow.program, flow.about, |options| flow.run(options))
-}
-
 impl MeshFlow {
-    fn run(&self, options: &Options) -> Result<()> {
+    /// Runs an experiment with this mesh.
+    pub fn run(&self, own: &Experiment) -> ExitCode {
+        own.run_with_help(self.about, |options| self.compute(options))
+    }
+
+    fn compute(&self, options: &Options) -> Result<()> {
         let run = &options.figure.run;
         let side = options.mesh.box_side(&self.mesh);
         let variants = options.schemes.learned();
@@ -150,49 +102,4 @@ impl MeshFlow {
         };
         (steps, more)
     }
-}
-
-/// Finds the Clifford torus nearest to the last shape of each run, and draws it there.
-fn clifford_tori(session: &mut Session, all: &mut [Flowed]) -> Result<String> {
-    let mut tori = BTreeMap::new();
-    for one in all {
-        let case = &one.trajectory.case;
-        let last = one.trajectory.field(one.trajectory.steps())?;
-        let title = format!("Clifford torus, {}", one.label());
-        let torus = session.phase(title, |_| {
-            Ok(CliffordTorus::nearest(&last, case.scales.eps)?)
-        })?;
-        let as_field = || Ok(torus.phase_field(last.grid(), case.scales.eps)?);
-        let w = energy_by_elements(case, as_field)?;
-        let (l2, outer_radius) = (torus.l2, torus.outer_radius);
-        let papers = match one.snapshots.last().and_then(|last| last.paper) {
-            Some(_) => format!(" (paper: distance {PAPERS_L2:.4}, w = {PAPERS_CLIFFORD})"),
-            None => String::new(),
-        };
-        session.remark(format!(
-            "Nearest Clifford torus, {}: L2 distance {l2:.4}, outer radius {outer_radius:.3}{}{papers}",
-            one.label(),
-            w.map_or(String::new(), |w| format!(", w = {w:.2}"))
-        ));
-        let circles = torus.minor_circles(CIRCLES.0, CIRCLES.1)?.into_iter();
-        let tube = |circle: Vec<[f64; 3]>| Tube {
-            closed: true,
-            ..Tube::new(circle, 0.1 * case.scales.eps)
-        };
-        if let Some(shown) = one.snapshots.last_mut() {
-            let w = w.map_or(String::new(), |w| format!("\n(which has w = {w:.2})"));
-            let torus = format!("L² distance to the torus {l2:.4}{w}");
-            shown.caption = format!("{}\n{torus}", shown.caption);
-            shown.tubes = circles.map(tube).collect();
-        }
-        let metrics = [
-            ("clifford_l2", l2.into()),
-            ("clifford_w", w.into()),
-            ("clifford_outer_radius", outer_radius.into()),
-        ];
-        session.metrics(&one.key(), metrics)?;
-        tori.insert(one.key(), torus);
-    }
-    session.output.write_json("clifford.json", &tori)?;
-    Ok(" Circles: of the nearest Clifford torus; one has 4π² = 39.48 in the limit.".to_owned())
 }

@@ -3,6 +3,8 @@
 pub mod libraries;
 
 pub use self::libraries::*;
+pub use crate::experiment::{Experiment, Figures, ResultFolder};
+pub use crate::metrics::{METHOD, MetricTable};
 pub use crate::networks::{
     ACCURATE, Chosen, ELEMENTS, EPS, NetworkOptions, PAPERS, STEP, convergence_network, operator,
     planar_flow, takes_networks, time,

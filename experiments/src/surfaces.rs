@@ -6,6 +6,52 @@ use render::{Picture, Quality, Rgb, Scene, Tube};
 
 use crate::prelude::*;
 
+/// What is said about every surface.
+pub const METRICS: MetricTable = MetricTable {
+    title: "Surfaces",
+    note: "Without a method the scheme is the paper's with the learned operator; in `inpainting_3d` it is the \
+         calibrated scheme with the accurate network.",
+    words: &[METHOD],
+    rows: &[
+        (
+            "SURFACE[.METHOD].w.stepK",
+            "Willmore energy, measured by the implicit finite-element step in the norm of the mass matrix, as in the \
+             paper; absent on more than 2^26 nodes",
+        ),
+        (
+            "SURFACE[.METHOD].w_scheme.stepK",
+            "Willmore energy as the scheme itself measures it, by its operator and its calibration",
+        ),
+        (
+            "SURFACE[.METHOD].perimeter.stepK, SURFACE[.METHOD].volume.stepK",
+            "area of the surface `P_eps`, volume of `{u > 0}`",
+        ),
+        (
+            "SURFACE[.METHOD].euler_characteristic.stepK",
+            "Euler characteristic of the surface: 2 for a sphere, 0 for a torus",
+        ),
+        (
+            "SURFACE[.METHOD].energy_increases, SURFACE[.METHOD].hvp_per_step",
+            "substeps in which the energy of the step rose; as for circles, per substep",
+        ),
+        ("SURFACE[.METHOD].seconds", "wall time of all steps"),
+        (
+            "SURFACE[.METHOD].peak_mib, SURFACE.peak_mib_with_pictures, disk_and_cube.peak_mib_with_pictures",
+            "largest memory of the process in MiB until the steps were made, if they were made in one go, and until \
+             the pictures were drawn",
+        ),
+        (
+            "SURFACE[.METHOD].l2_to_fe.stepK",
+            "L2 distance to the run by nested implicit finite elements",
+        ),
+        (
+            "SURFACE[.METHOD].clifford_l2, SURFACE[.METHOD].clifford_w, SURFACE[.METHOD].clifford_outer_radius",
+            "the Clifford torus nearest to the last step: its L2 distance, its `w` on this grid, the radius of its \
+             largest circle",
+        ),
+    ],
+};
+
 const EPS_OVER_H: f64 = 2.0;
 const WIDTH: usize = 17;
 /// From above and from the side.

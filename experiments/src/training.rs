@@ -5,6 +5,52 @@ use model::{Network, Quality, Ratios};
 
 use crate::prelude::*;
 
+/// What is said about networks.
+pub const METRICS: MetricTable = MetricTable {
+    title: "Networks",
+    note: "Losses are the paper's: mean squares over the nodes of the unit cube and over the radii. `.adam`: trained by \
+         the paper's Adam instead of Levenberg-Marquardt.",
+    words: &[(
+        "NETWORK",
+        "`n128`, `n256`, `n512`, for the plane; `surfaces`; `inpainting`",
+    )],
+    rows: &[
+        (
+            "[train.]NETWORK[.adam].held_out_loss, [train.]NETWORK[.adam].flipped_loss",
+            "loss on radii that were held out, evenly spread from 0.05 to 0.4; the same with both phases exchanged",
+        ),
+        (
+            "[train.]NETWORK[.adam].identity_loss",
+            "loss of the identity map on those radii, for scale",
+        ),
+        (
+            "[train.]NETWORK[.adam].reference_loss, [train.]NETWORK[.adam].reference_flipped_loss",
+            "losses on a fixed draw of forty radii",
+        ),
+        (
+            "[train.]NETWORK[.adam].transfer_min, [train.]NETWORK[.adam].transfer_max, \
+             [train.]NETWORK[.adam].transfer_imaginary",
+            "extremes of the kernel's transfer function; its largest imaginary part, 0 for a symmetric kernel",
+        ),
+        (
+            "[train.]NETWORK[.adam].phase_defect",
+            "by how much the activation misses the pure phases, the larger of abs(F(1) - 1) and abs(F(-1) + 1)",
+        ),
+        (
+            "[train.]NETWORK[.adam].activation_roughness",
+            "largest change of `F''` over a short distance, relative to its largest value: spikes would show",
+        ),
+        (
+            "[train.]NETWORK[.adam].radial_asymmetry",
+            "spread of the kernel at equal distances from its centre, relative to its largest value",
+        ),
+        (
+            "train.NETWORK[.adam].seconds, train.NETWORK[.adam].iterations",
+            "wall time and iterations of the training",
+        ),
+    ],
+};
+
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NetworkSpec {
     pub name: &'static str,

@@ -1,5 +1,6 @@
 //! The programs from outside.
 
 mod common;
+mod documents;
 mod programs;
 mod surfaces;

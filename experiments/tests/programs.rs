@@ -1,61 +1,61 @@
-//! The compiled programs: what they refuse, and the quick convergence test.
+//! The compiled programs: what they refuse, and their quick runs.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Summary, read_summary, refused, run};
+use crate::common::{Summary, finished, read_summary, refused, run};
 use engine::{Method, Record, Run, Scheme};
+use experiments::experiment::Experiment;
 use experiments::networks::Chosen;
+use experiments::programs::EXPERIMENTS;
 use experiments::timing;
 use model::Shipped;
 use operators::ComputeDevice;
 
-const CALIBRATION: &str = env!("CARGO_BIN_EXE_calibration");
-const CIRCLES: &str = env!("CARGO_BIN_EXE_circle_convergence");
-const DENOISING: &str = env!("CARGO_BIN_EXE_denoising");
-const ELASTICA: &str = env!("CARGO_BIN_EXE_elastica");
-const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_2d");
-const LEARNED: &str = env!("CARGO_BIN_EXE_learned_networks");
-const CROSS: &str = env!("CARGO_BIN_EXE_cross");
-const MCF_CROSS: &str = env!("CARGO_BIN_EXE_mcf_cross");
-const PERFORMANCE: &str = env!("CARGO_BIN_EXE_performance");
-const RECTANGLE: &str = env!("CARGO_BIN_EXE_rectangle");
-const TIMING: &str = env!("CARGO_BIN_EXE_timing_tables");
-const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
-const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
-const TRAIN: &str = env!("CARGO_BIN_EXE_train_networks");
-const UNSHRINKING: &str = env!("CARGO_BIN_EXE_unshrinking");
-const VESICLES: &str = env!("CARGO_BIN_EXE_vesicles");
+const CALIBRATION: &str = "calibration";
+const CIRCLES: &str = "circle_convergence";
+const DENOISING: &str = "denoising";
+const ELASTICA: &str = "elastica";
+const INPAINTING: &str = "inpainting_2d";
+const LEARNED: &str = "learned_networks";
+const CROSS: &str = "cross";
+const MCF_CROSS: &str = "mcf_cross";
+const PERFORMANCE: &str = "performance";
+const RECTANGLE: &str = "rectangle";
+const TIMING: &str = "timing_tables";
+const TRAIN: &str = "train_networks";
+const UNSHRINKING: &str = "unshrinking";
+const VESICLES: &str = "vesicles";
+
+/// The experiments that have quick runs, with the options of those.
+fn quick_runs() -> impl Iterator<Item = (&'static Experiment, Vec<&'static str>)> {
+    EXPERIMENTS.iter().filter_map(|experiment| {
+        let options = [&["--quick"], experiment.quick?].concat();
+        Some((*experiment, options))
+    })
+}
+
+#[test]
+#[ignore = "the quick runs of all experiments: see scripts/test_long"]
+fn every_quick_run_writes_its_figures_and_metrics_that_are_explained() {
+    for (experiment, options) in quick_runs() {
+        let root = tempfile::tempdir().unwrap();
+        let options = [&options[..], &["--quiet", "--output", "out"]].concat();
+        finished(experiment.name, root.path(), &options);
+    }
+}
 
 #[test]
 fn devices_that_are_unknown_or_not_compiled_in() {
     let root = tempfile::tempdir().unwrap();
-    for program in [
-        CALIBRATION,
-        CIRCLES,
-        CROSS,
-        INPAINTING,
-        LEARNED,
-        MCF_CROSS,
-        PERFORMANCE,
-        RECTANGLE,
-        SPHERES,
-        DISK_AND_CUBE,
-        TIMING,
-        TRAIN,
-    ] {
-        refused(
-            program,
-            root.path(),
-            &["--quick", "--device", "abacus"],
-            &["abacus"],
-        );
-        for kind in operators::DeviceKind::ALL {
-            if !kind.is_compiled() {
-                let arguments = ["--quick", "--device", kind.name()];
-                refused(program, root.path(), &arguments, &[kind.name()]);
-            }
+    let kinds = operators::DeviceKind::ALL.into_iter();
+    let not_compiled = kinds.filter(|kind| !kind.is_compiled());
+    let names: Vec<_> = not_compiled.map(operators::DeviceKind::name).collect();
+    for (experiment, options) in quick_runs() {
+        for device in ["abacus"].iter().chain(&names) {
+            let options = [&options[..], &["--device", device]].concat();
+            refused(experiment.name, root.path(), &options, &[device]);
         }
     }
 }
@@ -135,26 +135,11 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     }
     refused(TIMING, root.path(), &["--budget", "0"], &["--budget"]);
     fs::write(root.path().join("results"), "a file of the user").unwrap();
-    for program in [
-        CALIBRATION,
-        CIRCLES,
-        CROSS,
-        LEARNED,
-        MCF_CROSS,
-        PERFORMANCE,
-        RECTANGLE,
-        SPHERES,
-        DISK_AND_CUBE,
-        TIMING,
-        TRAIN,
-    ] {
-        refused(program, root.path(), &["--quick"], &["results"]);
-        refused(
-            program,
-            root.path(),
-            &["--quick", "--output", "results"],
-            &["results"],
-        );
+    for (experiment, options) in quick_runs() {
+        let program = experiment.name;
+        refused(program, root.path(), &options, &["results"]);
+        let options = [&options[..], &["--output", "results"]].concat();
+        refused(program, root.path(), &options, &["results"]);
     }
 }
 
@@ -522,10 +507,7 @@ fn the_quick_vesicle_keeps_its_area_and_volume() {
 
 /// The metrics of a quick run into the folder `out`.
 fn quick_summary(program: &str, root: &Path) -> Summary {
-    let output = run(program, root, &["--quick", "--quiet", "--output", "out"]);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && message.is_empty(), "{message}");
-    read_summary(&root.join("out"))
+    finished(program, root, &["--quick", "--quiet", "--output", "out"])
 }
 
 #[test]

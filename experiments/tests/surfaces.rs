@@ -1,9 +1,8 @@
 //! Surfaces: the programs, and what their flows must satisfy.
 
 use std::fs;
-use std::path::Path;
 
-use crate::common::{Summary, read_summary, refused, run};
+use crate::common::{finished, read_summary, refused, run};
 use engine::{Case, Record, Run, Scheme, StepRule, energy_increases};
 use experiments::networks::Chosen;
 use experiments::surfaces::{centred_box, needed_network, scales};
@@ -13,28 +12,20 @@ use geometry::{Field, SignedDistanceExt, npy, phase_field};
 use operators::ComputeDevice;
 use runs::Interrupt;
 
-const ARMADILLO: &str = env!("CARGO_BIN_EXE_armadillo");
-const DISK_AND_CUBE: &str = env!("CARGO_BIN_EXE_disk_and_cube");
-const INPAINTING: &str = env!("CARGO_BIN_EXE_inpainting_3d");
-const MESH_DISTANCE: &str = env!("CARGO_BIN_EXE_mesh_distance");
-const ROCKER_ARM: &str = env!("CARGO_BIN_EXE_rocker_arm");
-const SPHERES: &str = env!("CARGO_BIN_EXE_spheres");
+const ARMADILLO: &str = "armadillo";
+const DISK_AND_CUBE: &str = "disk_and_cube";
+const INPAINTING: &str = "inpainting_3d";
+const MESH_DISTANCE: &str = "mesh_distance";
+const ROCKER_ARM: &str = "rocker_arm";
+const SPHERES: &str = "spheres";
 
 const TAU: f64 = 1.0 / 262_144.0;
-
-/// Runs a program that must succeed without a word, and returns its metrics.
-fn metrics(program: &str, folder: &Path, arguments: &[&str]) -> Summary {
-    let output = run(program, folder, arguments);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && message.is_empty(), "{message}");
-    read_summary(&folder.join("out"))
-}
 
 #[test]
 fn built_in_shapes_flow_without_any_file() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--procedural", "--output", "out"];
-    let summary = metrics(ARMADILLO, root.path(), &arguments);
+    let summary = finished(ARMADILLO, root.path(), &arguments);
     let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!(metric("armadillo.w.step2") < metric("armadillo.w.step0"));
     assert!(metric("armadillo.energy_increases") <= 0.0);
@@ -48,7 +39,7 @@ fn built_in_shapes_flow_without_any_file() {
     ] {
         assert!(root.path().join("out").join(file).exists(), "{file}");
     }
-    let summary = metrics(ROCKER_ARM, root.path(), &arguments);
+    let summary = finished(ROCKER_ARM, root.path(), &arguments);
     let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!(metric("rocker_arm.w.step2") < metric("rocker_arm.w.step0"));
     assert!(metric("rocker_arm.energy_increases") <= 0.0);
@@ -64,7 +55,7 @@ fn built_in_shapes_flow_without_any_file() {
 fn cube_and_disk_come_near_their_finite_element_runs() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--output", "out"];
-    let summary = metrics(DISK_AND_CUBE, root.path(), &arguments);
+    let summary = finished(DISK_AND_CUBE, root.path(), &arguments);
     let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     for key in ["cube", "disk"] {
         assert!(metric(&format!("{key}.w.step2")) < metric(&format!("{key}.w.step0")));
@@ -78,7 +69,7 @@ fn cube_and_disk_come_near_their_finite_element_runs() {
 fn quick_inpainting_changes_nothing_outside() {
     let root = tempfile::tempdir().unwrap();
     let arguments = ["--quick", "--quiet", "--output", "out"];
-    let summary = metrics(INPAINTING, root.path(), &arguments);
+    let summary = finished(INPAINTING, root.path(), &arguments);
     let metric = |name: &str| *summary.get(name).unwrap_or_else(|| panic!("no {name}"));
     for (key, last) in [("ball", 5), ("tubes", 8)] {
         assert!(metric(&format!("{key}.changed_outside")) <= 0.0);
@@ -103,7 +94,7 @@ fn quick_inpainting_changes_nothing_outside() {
 #[test]
 fn quick_spheres_keep_their_radius() {
     let root = tempfile::tempdir().unwrap();
-    let summary = metrics(
+    let summary = finished(
         SPHERES,
         root.path(),
         &["--quick", "--quiet", "--output", "out"],

@@ -1,5 +1,4 @@
-//! Pages, the page of results, and the documents of the repository.
+//! Pages, and the page of results.
 
-mod documents;
 mod pages;
 mod results;

@@ -1,5 +1,6 @@
 //! A scanned figure under Willmore flow with time steps that double.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::mesh_flow::main(&experiments::mesh_flow::ARMADILLO_FLOW)
+    experiments::programs::armadillo::EXPERIMENT.main()
 }

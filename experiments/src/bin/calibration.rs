@@ -1,5 +1,6 @@
 //! The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::calibration::program)
+    experiments::programs::calibration::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::circle_convergence::program)
+    experiments::programs::circle_convergence::EXPERIMENT.main()
 }

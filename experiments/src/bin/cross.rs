@@ -1,5 +1,6 @@
 //! The cross under Willmore flow.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::comparison::CROSS)
+    experiments::programs::cross::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::denoising::program)
+    experiments::programs::denoising::EXPERIMENT.main()
 }

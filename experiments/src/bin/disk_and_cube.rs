@@ -1,5 +1,6 @@
 //! A cube and a thick disk under Willmore flow.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::disk_and_cube::program)
+    experiments::programs::disk_and_cube::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Closed elastic curves: length and area held.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::elastica::program)
+    experiments::programs::elastica::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::inpainting_3d::program)
+    experiments::programs::inpainting_3d::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Pictures and quality of the learned 2D operators.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::learned_networks::program)
+    experiments::programs::learned_networks::EXPERIMENT.main()
 }

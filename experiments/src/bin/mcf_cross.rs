@@ -1,5 +1,6 @@
 //! The cross under mean curvature flow.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::comparison::MCF_CROSS)
+    experiments::programs::mcf_cross::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! The signed distance of any mesh on any grid.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::mesh_distance::program)
+    experiments::programs::mesh_distance::EXPERIMENT.main()
 }

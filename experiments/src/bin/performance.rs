@@ -1,5 +1,6 @@
 //! What a time step costs, and where the time goes.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::performance::program)
+    experiments::programs::performance::EXPERIMENT.main()
 }

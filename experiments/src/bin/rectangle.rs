@@ -1,5 +1,6 @@
 //! The rectangle under Willmore flow.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::comparison::main(&experiments::comparison::RECTANGLE)
+    experiments::programs::rectangle::EXPERIMENT.main()
 }

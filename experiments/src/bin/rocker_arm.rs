@@ -1,5 +1,6 @@
 //! A machine part of genus one under Willmore flow, and the Clifford torus next to it.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::mesh_flow::main(&experiments::mesh_flow::ROCKER_ARM_FLOW)
+    experiments::programs::rocker_arm::EXPERIMENT.main()
 }

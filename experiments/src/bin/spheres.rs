@@ -1,5 +1,6 @@
 //! Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::spheres::program)
+    experiments::programs::spheres::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Time of the methods for the same flow on the same machine.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::timing_tables::program)
+    experiments::programs::timing_tables::EXPERIMENT.main()
 }

@@ -1,5 +1,6 @@
 //! Trains the networks that ship with the library.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::train_networks::program)
+    experiments::programs::train_networks::EXPERIMENT.main()
 }

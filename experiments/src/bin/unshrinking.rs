@@ -1,5 +1,6 @@
 //! Segmentations without their steps, and their volumes.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::unshrinking::program)
+    experiments::programs::unshrinking::EXPERIMENT.main()
 }

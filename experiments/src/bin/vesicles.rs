@@ -1,5 +1,6 @@
 //! Lipid vesicles: area and volume held.
 
+// Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {
-    experiments::harness::main(experiments::programs::vesicles::program)
+    experiments::programs::vesicles::EXPERIMENT.main()
 }

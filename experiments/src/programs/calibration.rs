@@ -7,6 +7,65 @@ use model::training::SphereData;
 use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
 use solver::Factors;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "calibration",
+    summary: "The factors by which the hybrid scheme differs from Willmore flow, predicted and measured on discs.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "calibration",
+        title: "Calibration",
+        description: "Not in the paper: by which factors the scheme differs from Willmore flow with each network, \
+                 predicted and measured.",
+        figures: &[
+            (
+                "discs",
+                "Willmore energy of discs over that of the exact circle, against the radius.",
+            ),
+            (
+                "diagnostics",
+                "Displacement errors, spectra and second derivatives of the operators.",
+            ),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Calibration",
+    note: "Networks are named by dimension, kernel width, `eps / h` and `tautilde / h^2`; symbols are those of \
+         [calibration](../docs/calibration.md).",
+    words: &[],
+    rows: &[
+        (
+            "[accurate_]dN_kN_epsN_stepN.energy, [accurate_]dN_kN_epsN_stepN.metric",
+            "the factors `c` and `m`",
+        ),
+        (
+            "[accurate_]dN_kN_epsN_stepN.spontaneous_curvature",
+            "`eps kappa_0`, the curvature that the operator takes for flat",
+        ),
+        (
+            "[accurate_]dN_kN_epsN_stepN.displacement",
+            "displacement of a nearly flat interface in a step over `tautilde kappa`",
+        ),
+        (
+            "[accurate_]dN_kN_epsN_stepN.alignment",
+            "`cos^2` of the angle between `psi` and `w'`",
+        ),
+        (
+            "[accurate_]dN_kN_epsN_stepN.eigenvalue",
+            "eigenvalue of `J` that belongs to translations, 1 in the limit",
+        ),
+        (
+            "[accurate_]dN_kN_epsN_stepN.position_spread, [accurate_]dN_kN_epsN_stepN.normal_spread",
+            "spread of `c` over positions of the interface between two planes of nodes, and over its normals",
+        ),
+    ],
+};
+
 const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
 const QUICK_RADII: [f64; 2] = [0.15, 0.3];
 /// Distance of a disc to the box's boundary.
@@ -32,8 +91,8 @@ const ELEMENTS: [[f64; 2]; 2] = [[2.0, 1.0], [4.0, 4.0]];
 /// either phase with the one that the scheme finds, and the energy of balls and Clifford tori with the exact one; draws what
 /// tells good networks from bad ones.
 #[derive(Parser, Debug)]
-#[command(name = "calibration", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -46,7 +105,7 @@ pub struct Options {
     install: Option<PathBuf>,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let mut networks: Vec<(String, Network)> = Vec::new();
     for path in &options.network {
@@ -73,7 +132,7 @@ pub fn program(options: &Options) -> Result<()> {
         "inner_step": STEP,
         "time_step": STEP_RATIO * STEP,
     });
-    let mut session = Session::open("calibration", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let install = options.install.as_ref().map(OutputDir::create);
     let install = install.transpose()?;
     let (mut all, mut rows) = (Vec::new(), Vec::new());

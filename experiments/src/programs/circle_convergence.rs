@@ -2,6 +2,97 @@ use crate::circles::{self, Circle, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "circle_convergence",
+    summary: "Convergence test on circles: mean curvature flow and Willmore flow against the exact solutions.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[
+        ResultFolder {
+            name: "circle_convergence",
+            title: "Flows of circles",
+            description: "Mean curvature flow and Willmore flow of 30 circles against the exact solutions, by the hybrid \
+                 scheme and by finite elements.",
+            figures: &[
+                (
+                    "convergence",
+                    "Mean L² error over the circles against time, mean curvature flow and Willmore flow.",
+                ),
+                (
+                    "error_over_radius",
+                    "Error at the end against the initial radius.",
+                ),
+                (
+                    "work_per_step",
+                    "Hessian-vector products and Newton steps for each step of Willmore flow, mean over the circles.",
+                ),
+                (
+                    "error_over_cost",
+                    "Error of Willmore flow at the end against the time that a circle takes.",
+                ),
+            ],
+            options: Some("--cells 64,128,256 --methods hybrid,fe_implicit,fe_semi"),
+        },
+        ResultFolder {
+            name: "circle_cost",
+            title: "Accuracy against cost",
+            description: "Not in the paper: what Willmore flow of circles costs by every method and scheme, n = 64 to 512, and \
+                 how accurate it is.",
+            figures: &[(
+                "error_over_cost",
+                "Error of Willmore flow at the end against the time that a circle takes.",
+            )],
+            options: Some(
+                "--circles 2 --cells 64,128,256,512 --methods hybrid,fe_implicit,fe_semi",
+            ),
+        },
+    ],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Circles",
+    note: "",
+    words: &[
+        METHOD,
+        (
+            "FLOW",
+            "`mcf`, mean curvature flow; `willmore`, Willmore flow",
+        ),
+    ],
+    rows: &[
+        (
+            "FLOW.nN.METHOD.l2.stepK",
+            "L2 distance to the exact solution, mean over the circles",
+        ),
+        (
+            "FLOW.scale",
+            "L2 distance between the first and the last exact solution, mean over the circles",
+        ),
+        (
+            "willmore.nN.METHOD.hvp_per_step",
+            "Hessian-vector products per time step; those on coarser grids count by their share of the unknowns",
+        ),
+        (
+            "willmore.nN.METHOD.newton_per_step",
+            "Newton steps per time step",
+        ),
+        (
+            "willmore.nN.METHOD.seconds_per_step",
+            "wall time per time step",
+        ),
+        (
+            "willmore.nN.METHOD.energy_increases",
+            "time steps in which the energy of the step did not fall or the Willmore energy rose; 0 is right",
+        ),
+        (
+            "willmore.nN.METHOD.negative_curvature",
+            "linear solves that met a direction of negative curvature",
+        ),
+    ],
+};
+
 /// Steps at which tables and summaries give the error.
 const SHOWN_STEPS: [usize; 5] = [1, 8, 16, 32, 64];
 /// Folder of finished circles, until all are finished.
@@ -10,8 +101,8 @@ const FINISHED: &str = "partial";
 /// Mean curvature flow by all methods and Willmore flow by the learned operator (with --full by all) of 30 circles, eps = 2^-6, 64
 /// steps of 2^-14: L2 distance to the exact solution over time, mean over the radii 0.05 pi + 0.15 pi i/30.
 #[derive(Parser, Debug)]
-#[command(name = "circle_convergence", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     study: StudyOptions,
 
@@ -25,7 +116,7 @@ pub struct Options {
     circles: Option<usize>,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.study.run;
     let (all, steps) = run.either((4, 8), (circles::COUNT, circles::STEPS));
     let count = options.circles.unwrap_or(all);
@@ -47,7 +138,7 @@ pub fn program(options: &Options) -> Result<()> {
         "cells": study.cells, "runs": study.variants().collect::<Vec<_>>(), "networks": study.checksums(),
         "circles": count, "steps": steps, "eps": EPS, "time_step": STEP,
     });
-    let mut session = Session::open("circle_convergence", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
         let Variant { flow, n, .. } = planned.0;

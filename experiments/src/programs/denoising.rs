@@ -10,6 +10,72 @@ use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
 use surfaces::{Fairing, TAUBIN, samples, usual_up_axis};
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "denoising",
+    summary: "Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "denoising",
+        title: "Noise of meshes",
+        description: "Not in the paper: noise taken off meshes by Willmore flow, beside Taubin's and Laplacian smoothing.",
+        figures: &[
+            (
+                "distances",
+                "Distance to the clean surface over the number of iterations.",
+            ),
+            (
+                "surfaces",
+                "The clean and the noisy mesh, and what becomes of it.",
+            ),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Noise of meshes",
+    note: "",
+    words: &[
+        ("MESH", "`figure`, `lever`, `rocker_arm`, `armadillo`"),
+        (
+            "SMOOTHER",
+            "`noisy`, the mesh with noise; `fair`, by the program; `taubin` and `laplacian`, smoothing with the best \
+             number of iterations",
+        ),
+    ],
+    rows: &[
+        (
+            "MESH.noiseN.SMOOTHER.rms",
+            "root of the mean square distance of the vertices to the clean surface, in percent of the longest side; \
+             noise of N percent",
+        ),
+        (
+            "MESH.noiseN.SMOOTHER.normals",
+            "mean angle between the faces and the clean ones in degrees",
+        ),
+        (
+            "MESH.noiseN.SMOOTHER.volume",
+            "change of the volume in percent, against the clean mesh",
+        ),
+        (
+            "MESH.noiseN.SMOOTHER.least_normals",
+            "the least such angle over all numbers of iterations",
+        ),
+        (
+            "MESH.noiseN.fair_over_taubin, MESH.noiseN.fair_over_best_taubin",
+            "the distance `rms` of `fair` over the least one of Taubin's smoothing, with 3 to 30 iterations and with \
+             up to 100",
+        ),
+        (
+            "MESH.noiseN.normals_over_taubin, MESH.noiseN.normals_over_best_taubin",
+            "the same of the angles `normals`",
+        ),
+    ],
+};
+
 const TITLE: &str = "Noise of meshes taken off";
 /// Standard deviations along the normals, in percent of the longest side.
 const NOISES: [f64; 2] = [0.3, 0.5];
@@ -24,8 +90,8 @@ const USUAL: RangeInclusive<usize> = 3..=30;
 /// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults, by Taubin's
 /// and by Laplacian smoothing with the number of iterations that comes nearest to the clean mesh: distances, normals and volumes.
 #[derive(Parser, Debug)]
-#[command(name = "denoising", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -68,7 +134,7 @@ const QUALITY: [(&str, Format, &str); 3] = [
     ("volume, %", Fixed(3), "volume"),
 ];
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let quick = options.run.quick;
     let noises = if quick { &NOISES[..1] } else { &NOISES };
     let cells = if quick { 64 } else { CELLS };
@@ -76,7 +142,7 @@ pub fn program(options: &Options) -> Result<()> {
     let names: Vec<&str> = meshes.iter().map(|clean| clean.name.as_str()).collect();
     let parameters = json!({ "meshes": names, "noise_percent": noises, "cells": cells, "side": SIDE,
         "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
-    let mut session = Session::open("denoising", &options.run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, &options.run, parameters)?;
     let (mut rows, mut charts, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for clean in &meshes {
         for &noise in noises {

@@ -1,6 +1,58 @@
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, VIEW};
+use crate::surfaces::{self, Flowed, SchemeOptions, Setting, Surface, VIEW};
 use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
+
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "disk_and_cube",
+    summary: "A cube and a thick disk under Willmore flow.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "disk_and_cube",
+        title: "Cube and thick disk",
+        description: "Willmore flow of two solids by the hybrid scheme beside nested finite elements.",
+        figures: &[(
+            "surfaces",
+            "The surfaces at steps 0, 1 and 100, with their Willmore energies.",
+        )],
+        options: Some(""),
+    }],
+    metrics: &[&surfaces::METRICS, &METRICS],
+    words: &[("SURFACE", "`cube`, `disk`, `ellipsoid`")],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Surfaces against the exact flow",
+    note: "",
+    words: &[],
+    rows: &[
+        (
+            "SURFACE.exact.area.stepK, SURFACE.exact.volume.stepK, SURFACE.exact.w.stepK",
+            "area, volume and Willmore energy of the exact flow of the surface of revolution, at `t = K 2^-18`",
+        ),
+        (
+            "SURFACE.nN.controlled.area.stepK, SURFACE.nN.controlled.volume.stepK, SURFACE.nN.controlled.w.stepK",
+            "the same of the zero set by coarea sums, from controlled steps of second order with the accurate \
+             operator, `eps = 2/N`",
+        ),
+        (
+            "SURFACE.nN.controlled.distance_to_exact.stepK",
+            "largest distance of the vertices of the isosurface from the exact surface",
+        ),
+        (
+            "SURFACE.nN.controlled.hvp_total.stepK, SURFACE.nN.controlled.steps.stepK, \
+             SURFACE.nN.controlled.estimated_error.stepK",
+            "Hessian-vector products and time steps so far, and their estimated time error",
+        ),
+        (
+            "SURFACE.extrapolated.area.stepK, SURFACE.extrapolated.volume.stepK, SURFACE.extrapolated.w.stepK, \
+             SURFACE.extrapolated.distance_to_exact.stepK, SURFACE.extrapolated.hvp_total.stepK, \
+             SURFACE.extrapolated.steps.stepK, SURFACE.extrapolated.estimated_error.stepK",
+            "the same extrapolated to `eps = 0` from strictly controlled runs with `eps = 1/32` and `1/64`, two cells \
+             to each, and half of that where corners are not yet round (`K` = 1); the work is that of both",
+        ),
+    ],
+};
 
 const TITLE: &str = "Willmore flow of a cube and of a thick disk";
 /// Cells per unit length of a quick run and of the paper.
@@ -18,8 +70,8 @@ const DISK_ENERGIES: [(usize, f64); 3] = [(0, 87.15), (1, 50.49), (STEPS, 25.59)
 /// Willmore flow of a cube and of a thick disk, n = 64, eps = 2^-5, tautilde = 2^-12, tau = 2^-18, by the hybrid scheme and by
 /// nested implicit finite elements: pictures, Willmore energies w and L2 distances after 0, 1 and 100 steps.
 #[derive(Parser, Debug)]
-#[command(name = "disk_and_cube", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
@@ -35,7 +87,7 @@ pub struct Options {
     schemes: SchemeOptions,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
@@ -70,7 +122,7 @@ pub fn program(options: &Options) -> Result<()> {
         "disk_half_height": half_height,
     });
     let parameters = setting.parameters(others)?;
-    let session = Session::open("disk_and_cube", run, parameters)?;
+    let session = Session::open(EXPERIMENT.name, run, parameters)?;
     let time = (StepRule::Constant(TAU).into(), steps);
     let comparisons = |session: &mut Session, all: &mut [Flowed]| {
         compare_with_finite_elements(session, all)?;

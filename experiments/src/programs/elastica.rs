@@ -2,6 +2,23 @@ use crate::equilibria::{self, Equilibrium};
 use crate::prelude::*;
 use reference::equilibria::elastica;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "elastica",
+    summary: "Closed elastic curves: length and area held.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "elastica",
+        title: "Elastic curves",
+        description: "Not in the paper: closed curves of least bending energy with given length and area, against exact \
+                 ones.",
+        figures: &[("shapes", "Curves at rest; blue: the exact curve.")],
+        options: Some(""),
+    }],
+    metrics: &[&equilibria::METRICS],
+    words: &[],
+};
+
 const TITLE: &str = "Closed elastic curves with given length and area";
 /// Isoperimetric quotients `4 pi area / length^2`.
 const QUOTIENTS: [f64; 6] = [0.95, 0.9, 0.8, 0.7, 0.6, 0.5];
@@ -13,16 +30,16 @@ const CELLS: usize = 128;
 /// Willmore flow of ellipses with length and area held until rest, by the accurate operator, n = 128, eps = 2h: energies and shapes against
 /// exact elastic curves, for several isoperimetric quotients.
 #[derive(Parser, Debug)]
-#[command(name = "elastica", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<()> {
+fn program(Options { run: options }: &Options) -> Result<()> {
     let count = if options.quick { 1 } else { QUOTIENTS.len() };
     let parameters = json!({ "n": CELLS, "eps_over_h": 2, "quotients": QUOTIENTS[..count], "radius": RADIUS, "side": SIDE });
-    let mut session = Session::open("elastica", options, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, options, parameters)?;
     let exact = session.phase("exact curves", |_| Ok(elastica(&QUOTIENTS[..count])?))?;
     let grid = Grid::<2>::per_unit(CELLS, SIDE)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);

@@ -1,5 +1,41 @@
 use crate::prelude::*;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "ellipse_orders",
+    summary: "The order of convergence of Willmore flow of an ellipse in h and in tau, against its own finest run.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "ellipse_orders",
+        title: "Orders of convergence",
+        description: "Not in the paper: Willmore flow of an ellipse with the grid spacing and the time step halved again \
+                 and again.",
+        figures: &[(
+            "orders",
+            "L² distances at t = 2⁻¹⁰ between successive runs, and to the finest run.",
+        )],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Orders of convergence",
+    note: "",
+    words: &[],
+    rows: &[
+        (
+            "ellipse.to_next.h.pairN, ellipse.to_next.tau.pairN",
+            "L2 distance between the N-th run and the next one, with `h` (`tau`) halved",
+        ),
+        (
+            "ellipse.order.h.pairN, ellipse.order.tau.pairN",
+            "order of convergence: binary logarithm of the ratio of this distance to the next",
+        ),
+    ],
+};
+
 const TITLE: &str = "Willmore flow of an ellipse, each h with its network";
 const HALF_AXES: [f64; 2] = [0.3, 0.2];
 const SIDE: f64 = 1.25;
@@ -13,17 +49,17 @@ const PARTS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Willmore flow of the ellipse with half axes 0.3 and 0.2 by the calibrated scheme with the accurate network, eps = 2^-6, tautilde =
 /// 2^-14, until t = 2^-10: L2 distances between runs with h and tau halved, and the orders of convergence.
 #[derive(Parser, Debug)]
-#[command(name = "ellipse_orders", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<()> {
+fn program(Options { run: options }: &Options) -> Result<()> {
     let (used, steps) = if options.quick { (3, 2) } else { (4, STEPS) };
     let parameters =
         json!({ "half_axes": HALF_AXES, "side": SIDE, "steps": steps, "tolerance": TOLERANCE });
-    let mut session = Session::open("ellipse_orders", options, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, options, parameters)?;
     let mut run = |size: f64, n: usize, parts: usize| {
         let operator = Chosen::default().operator(ACCURATE, n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;

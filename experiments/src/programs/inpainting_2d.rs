@@ -3,6 +3,26 @@ use crate::prelude::*;
 use model::{NeededNetwork, Ratios};
 use solver::Precision;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "inpainting_2d",
+    summary: "Inpainting in 2D: Willmore flow of the values in a region, the rest of the image held.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "inpainting_2d",
+        title: "Inpainting",
+        description: "Willmore flow of what lies inside the green frame; everything else is held.",
+        figures: &[
+            ("disk_frames", "A disk whose corner was cut out."),
+            ("cross_frames", "A cross whose middle is smoothed."),
+            ("energies", "Willmore energy against time."),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&inpainting::METRICS],
+    words: &[("SHAPE", "`disk`, `cross`")],
+};
+
 /// Cells per unit length of a quick run and of the paper.
 const CELLS: [usize; 2] = [256, 1024];
 const WIDTH: usize = 17;
@@ -22,8 +42,8 @@ const CORNER: f64 = 0.12;
 /// Steps are made in parts of adaptive size where one minimization would be too much for them. A run ends when nothing moves any more.
 /// The paper has n = 1024; eps = 4/n and tautilde = 4/n^2.
 #[derive(Parser, Debug)]
-#[command(name = "inpainting_2d", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -62,7 +82,7 @@ fn shapes(quick: bool) -> Result<[Shape<2>; 2]> {
     Ok([disk, cross])
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let n = options.common.figure.cells(CELLS);
     let grid = Grid::<2>::per_unit(n, 1.0)?;
@@ -80,7 +100,7 @@ pub fn program(options: &Options) -> Result<()> {
     let operator = networks.learned(scheme, &needed)?;
     let shapes = shapes(run.quick)?;
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open("inpainting_2d", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {
         let case = shape.case(grid, scales, &operator)?;

@@ -1,7 +1,29 @@
 use crate::inpainting::{self, GREEN, Inpainted, InpaintingOptions, Shape};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, Setting, Snapshot, Surface, VIEW, View, measured, write_snapshots};
+use crate::surfaces::{
+    self, Flowed, Setting, Snapshot, Surface, VIEW, View, measured, write_snapshots,
+};
 use render::Tube;
+
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "inpainting_3d",
+    summary: "Inpainting of surfaces: Willmore flow of the values in a region, the rest of the surface held.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "inpainting_3d",
+        title: "Inpainting of surfaces",
+        description: "Willmore flow of what lies inside the green box; everything else is held.",
+        figures: &[
+            ("ball_frames", "A ball whose corner was cut out."),
+            ("tubes_frames", "Six tubes that are blended."),
+            ("energies", "Willmore energy against time."),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&inpainting::METRICS, &surfaces::METRICS],
+    words: &[("SHAPE", "`ball`, `tubes`"), ("SURFACE", "`ball`, `tubes`")],
+};
 
 const TITLE: &str = "Inpainting of surfaces";
 /// Cells per unit length of a quick run and of the paper.
@@ -24,8 +46,8 @@ const MOST_EXTRA: usize = 24;
 /// Frames are those of the paper's 5 and 8 steps of tau = 2^-21. Further steps follow, each twice as long as the one before, until
 /// nothing moves any more. The paper has n = 128; eps = 2/n and tautilde = 1/n^2.
 #[derive(Parser, Debug)]
-#[command(name = "inpainting_3d", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     common: InpaintingOptions,
 
@@ -77,7 +99,7 @@ fn growing(papers: usize) -> StepRule {
     }
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.common.figure.run;
     let extra_steps = options.extra_steps;
     let message = format!(
@@ -90,7 +112,7 @@ pub fn program(options: &Options) -> Result<()> {
     let operator = setting.operator(variant)?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
     let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
-    let mut session = Session::open("inpainting_3d", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut flowed = Vec::new();
     for (shape, azimuth) in shapes.iter().zip(azimuths) {
         let surface = Surface {

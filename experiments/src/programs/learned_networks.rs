@@ -1,15 +1,42 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use crate::prelude::*;
-use crate::training::{NetworkSpec, held_out_radii, quality};
+use crate::training::{self, NetworkSpec, held_out_radii, quality};
 use model::training::levenberg_marquardt::{heat_kernel, splitting_activation};
 use model::{NeededNetwork, Network, Quality};
 use report::Heatmap;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "learned_networks",
+    summary: "Pictures and quality of the learned 2D operators.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "learned_networks",
+        title: "Learned networks",
+        description: "Kernels, activations and transfer functions of the trained mean curvature operators V[u] = F(K∗u), \
+                 and how well they fit.",
+        figures: &[
+            (
+                "learned_networks",
+                "Kernels and activations beside those of a splitting scheme.",
+            ),
+            (
+                "radial_symmetry",
+                "Entries of the kernels against their distance from the centre.",
+            ),
+            ("transfer", "Transfer functions of the kernels."),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&training::METRICS],
+    words: &[],
+};
+
 /// Kernels, activations, transfer functions and quality of the learned operators for n = 128, 256, 512.
 #[derive(Parser, Debug)]
-#[command(name = "learned_networks", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -17,7 +44,7 @@ pub struct Options {
     networks: NetworkOptions,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.run;
     let specs = &NetworkSpec::CONVERGENCE[..run.either(1, 3)];
     let needs: Vec<_> = (specs.iter().map(|spec| NeededNetwork::exactly(spec.ratios))).collect();
@@ -29,7 +56,7 @@ pub fn program(options: &Options) -> Result<()> {
     let checksums = (networks.iter()).map(|(spec, network)| (spec.name, network.fingerprint()));
     let checksums: BTreeMap<_, _> = checksums.collect();
     let parameters = json!({"networks": checksums, "held_out_radii": held_out_radii(run.quick)});
-    let mut session = Session::open("learned_networks", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut shown = Vec::new();
     for (spec, network) in networks {
         let quality = spec.measure(&mut session, &network)?;

@@ -5,12 +5,22 @@ use crate::meshes;
 use crate::prelude::*;
 use geometry::{npy, vti};
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "mesh_distance",
+    summary: "The signed distance of any mesh on any grid.",
+    program: |own| own.run(program),
+    quick: None,
+    results: &[],
+    metrics: &[],
+    words: &[],
+};
+
 /// Writes the signed distance to a closed triangle mesh, negative inside, at the nodes i/n of the unit cube. The mesh is scaled so
 /// that the longest side of its bounding box has the given length, and its bounding box is centred at (0.5, 0.5, 0.5).
 /// `willmore` takes the file with `--holds distance`.
 #[derive(Parser, Debug)]
-#[command(name = "mesh_distance", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     /// The mesh: OBJ, STL or PLY
     #[arg(long, value_name = "FILE")]
     mesh: PathBuf,
@@ -32,7 +42,7 @@ pub struct Options {
     quiet: bool,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let (path, output) = (options.mesh.display(), options.output.display());
     let extension = options.output.extension().map(OsStr::to_ascii_lowercase);
     let volume = extension.as_ref().is_some_and(|name| name == "vti");

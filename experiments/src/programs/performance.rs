@@ -4,6 +4,122 @@ use crate::{products, surfaces, timing};
 use geometry::shapes::Capsule;
 use runs::Interrupt;
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "performance",
+    summary: "What a time step costs, and where the time goes.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[
+        ResultFolder {
+            name: "performance",
+            title: "Performance",
+            description: "Not in the paper: what a step of the hybrid scheme costs in two and three dimensions, where the time \
+                 goes, and what bricks save.",
+            figures: &[
+                (
+                    "performance",
+                    "Time of a step, its products, and its parts.",
+                ),
+                (
+                    "storages",
+                    "The armadillo on the whole grid and on bricks near the surface: time, memory and stored cells.",
+                ),
+            ],
+            options: Some(""),
+        },
+        ResultFolder {
+            name: "gpu",
+            title: "Performance on a GPU",
+            description: "Not in the paper: what a step costs on an NVIDIA H100 in double precision, with 16 cores for the \
+                 work of the host, and what bricks save.",
+            figures: &[
+                ("performance", "Time of a step, and its parts."),
+                (
+                    "storages",
+                    "The armadillo on the whole grid and on bricks near the surface: time, memory of the host and \
+                     stored cells.",
+                ),
+            ],
+            options: None,
+        },
+    ],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Costs of a step",
+    note: "On a GPU, which computes while the host goes on, the time of a single product is not measured.",
+    words: &[
+        (
+            "CASE",
+            "`cross`, `disc` in quick runs, `cube`, `blob`, `armadillo`",
+        ),
+        (
+            "STORAGE",
+            "`dense`, the whole grid; `bricks`, what is near the surface",
+        ),
+    ],
+    rows: &[
+        (
+            "CASE.nN.steps, CASE.nN.seconds, CASE.nN.seconds_per_step",
+            "number of steps, wall time of all, median of one",
+        ),
+        (
+            "CASE.nN.hvp_per_step, CASE.nN.hvp_on_this_grid, CASE.nN.hvp_on_coarser_grids",
+            "Hessian-vector products per step: all, those on the grid itself, those on coarser grids by their share \
+             of the unknowns",
+        ),
+        ("CASE.nN.newton_per_step", "as for circles"),
+        (
+            "CASE.nN.ms_per_product, CASE.nN.product_over_floor, CASE.nN.pages_per_product",
+            "of a product in the steps: milliseconds, these over its Fourier transforms alone, new pages of memory \
+             after the first step",
+        ),
+        (
+            "CASE.nN.peak_mib",
+            "largest memory of the process in MiB, after all that earlier runs kept was given back",
+        ),
+        (
+            "CASE.nN.distance_to_tighter",
+            "L2 distance after 20 steps to the same flow minimized to a hundredth of the tolerance, over the way",
+        ),
+        (
+            "CASE.nN.STORAGE.seconds, CASE.nN.STORAGE.peak_mib",
+            "wall time of 16 steps of the armadillo and 32 of the cross by the accurate operator, with all between \
+             minimizations; largest memory",
+        ),
+        (
+            "CASE.nN.STORAGE.active_cells, CASE.nN.STORAGE.active_share, CASE.nN.STORAGE.w",
+            "stored cells at the beginning, their part of the grid; Willmore energy of the scheme after the last step",
+        ),
+        (
+            "CASE.nN.STORAGE.steps, CASE.nN.STORAGE.seconds_per_step, CASE.nN.STORAGE.newton_per_step, \
+             CASE.nN.STORAGE.hvp_per_step, CASE.nN.STORAGE.hvp_on_this_grid, CASE.nN.STORAGE.hvp_on_coarser_grids, \
+             CASE.nN.STORAGE.ms_per_product",
+            "as above, for steps and substeps that were not refused",
+        ),
+        (
+            "hvp.armadillo.nN.bricks_over_dense",
+            "milliseconds of a Hessian-vector product on bricks over that on the whole grid",
+        ),
+        (
+            "exponent.bricks.seconds, exponent.bricks.peak_mib, exponent.bricks.active_cells",
+            "power of `n` with which these grow on bricks, from n = 128 on",
+        ),
+        (
+            "hvp.NxN[xN].ms, hvp.NxN[xN].single_ms, hvp.NxN[xN].by_hand_ms, hvp.NxN[xN].evaluate_ms",
+            "milliseconds of a Hessian-vector product through Burn in double and in single precision, of one written \
+             by hand, of an energy with its gradient",
+        ),
+        (
+            "hvp.NxN[xN].floor_ms, hvp.NxN[xN].floor_single_ms, hvp.NxN[xN].ratio, hvp.NxN[xN].over_floor",
+            "milliseconds of its two pairs of Fourier transforms alone, in both precisions; what the product through \
+             Burn takes over that by hand and over the transforms",
+        ),
+    ],
+};
+
 /// Steps of a comparison with a smaller tolerance, and how much smaller.
 const COMPARED_STEPS: usize = 20;
 const TIGHTER: f64 = 100.0;
@@ -16,8 +132,8 @@ const FINEST_COMPARED: f64 = 256.0;
 /// (eps = 2h, 16 steps of the accurate scheme, tau = h^4/32 doubled after every step) on the whole grid and on bricks near the surface, and the
 /// cross (eps = 2h, 32 controlled steps of second order) on bricks.
 #[derive(Parser, Debug)]
-#[command(name = "performance", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -76,7 +192,7 @@ const PRODUCTS: [(&str, Format, &str); 7] = [
     ("energy and gradient [ms]", Fixed(2), "evaluate_ms"),
 ];
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.turns.is_finite() && options.turns > 0.0;
     require(possible, "--turns must be positive")?;
@@ -88,7 +204,7 @@ pub fn program(options: &Options) -> Result<()> {
     let networks = timing::networks(&options.networks, planes)?;
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
-    let mut session = Session::open("performance", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut all = Vec::new();
     let shape = run.either("disc", "cross");
     for &n in planes {

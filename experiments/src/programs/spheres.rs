@@ -1,7 +1,55 @@
 use crate::prelude::*;
 use crate::surfaces::Setting;
-use crate::training::{NetworkSpec, quality};
+use crate::training::{self, NetworkSpec, quality};
 use geometry::exact::{WILLMORE_ENERGY_SPHERE, mean_curvature_radius};
+
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "spheres",
+    summary: "Spheres by the network for surfaces: mean curvature flow, Willmore energies, and standing still.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "spheres",
+        title: "Spheres",
+        description: "Not in the paper: the network for surfaces on spheres, their mean curvature flow, their energies, \
+                 and whether they are stationary under Willmore flow.",
+        figures: &[(
+            "spheres",
+            "Errors of mean curvature flow, and the Willmore energy, against the radius.",
+        )],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS, &training::METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Spheres",
+    note: "",
+    words: &[METHOD],
+    rows: &[
+        (
+            "spheres.rN.w",
+            "`w` of the initial sphere of radius N/100, measured as for surfaces; `8 pi` is exact",
+        ),
+        (
+            "spheres.rN[.METHOD].w_learned, spheres.rN[.METHOD].w_relaxed",
+            "`w` as the scheme measures it, at the beginning and after 20 steps of Willmore flow",
+        ),
+        (
+            "spheres.rN[.METHOD].radius_change_over_h",
+            "change of the radius in these steps, in cells",
+        ),
+        (
+            "spheres.rN[.METHOD].energy_increases, spheres.rN[.METHOD].hvp_per_step",
+            "substeps in which the energy of the step rose; as for circles",
+        ),
+        (
+            "spheres.rN.mcf.METHOD.l2.stepK",
+            "L2 error under mean curvature flow",
+        ),
+    ],
+};
 
 const TITLE: &str = "Spheres by the network for surfaces";
 /// Cells per unit length of a quick run and of the paper.
@@ -20,8 +68,8 @@ const TAU: f64 = 1.0 / 262_144.0;
 /// R^2 = r^2 - 4t beside finite elements, Willmore energies w against 8 pi, and the change of the radius in 20 steps of Willmore
 /// flow, tau = 2^-18, which leaves spheres alone.
 #[derive(Parser, Debug)]
-#[command(name = "spheres", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 }
@@ -51,7 +99,7 @@ fn variants() -> impl Iterator<Item = (Method, Scheme)> {
         .filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
@@ -64,7 +112,7 @@ pub fn program(options: &Options) -> Result<()> {
     require(mean_curvature_radius(radii[0], end, 3) > 0.0, message)?;
     let others = json!({ "tau": TAU, "willmore_steps": willmore_steps });
     let parameters = setting.parameters(others)?;
-    let mut session = Session::open("spheres", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut all = Vec::new();
     for &radius in radii {
         all.push(session.phase(format!("radius {radius}"), |stage| {

@@ -5,6 +5,69 @@ use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
 use solver::Method::{self as Newton, Paper, Preconditioned};
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "timing_tables",
+    summary: "Time of the methods for the same flow on the same machine.",
+    program: |own| own.run(program),
+    quick: Some(&["--procedural"]),
+    results: &[ResultFolder {
+        name: "timing_tables",
+        title: "Computing time",
+        description: "128 Willmore steps of the cross by every method, which take turns on one machine, and one step of \
+                 the armadillo.",
+        figures: &[(
+            "timing",
+            "Wall time against cells per unit length, beside the paper's on other machines.",
+        )],
+        options: Some("--budget 100"),
+    }],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Times",
+    note: "",
+    words: &[
+        METHOD,
+        (
+            "ROW",
+            "`hybrid`; `hybrid_plain_newton`, with the paper's Newton-CG; `fe_implicit`, conjugate gradients inside; \
+             `fe_implicit_direct`, Cholesky inside; `fe_semi`",
+        ),
+    ],
+    rows: &[
+        (
+            "timing.nN.ROW.seconds",
+            "wall time of 128 steps of the cross; those that were not measured count as the hybrid scheme's, times \
+             the ratio of both over the later half of the measured ones",
+        ),
+        (
+            "timing.nN.ROW.measured_steps, timing.nN.ROW.measured_seconds",
+            "steps that were measured, and their wall time",
+        ),
+        (
+            "timing.nN.ROW.hvp_per_step, timing.nN.ROW.newton_per_step, timing.nN.ROW.inner_cg_per_step, \
+             timing.nN.ROW.factorizations_per_step",
+            "Hessian-vector products, Newton steps, iterations of inner conjugate gradients, Cholesky factorizations \
+             per step",
+        ),
+        (
+            "timing.nN.ROW.steps, timing.nN.ROW.seconds_per_step, timing.nN.ROW.hvp_on_this_grid, \
+             timing.nN.ROW.hvp_on_coarser_grids, timing.nN.ROW.ms_per_product",
+            "as for `performance`, of the steps that were measured",
+        ),
+        (
+            "timing.nN.ROW.times_hybrid_measured_steps",
+            "wall time over that of the hybrid scheme for the same steps",
+        ),
+        (
+            "timing.armadillo.METHOD.seconds, timing.armadillo.METHOD.hvp",
+            "wall time and Hessian-vector products of one step of the armadillo, n = 64",
+        ),
+    ],
+};
+
 /// Time steps of the table, until `t = 2^-7`.
 const STEPS: usize = 128;
 /// Headings of the columns with the times over those of the hybrid scheme, and with the paper's.
@@ -15,8 +78,8 @@ const PAPERS: &str = "paper, other machines [s]";
 /// nested finite elements, taking turns step by step on this machine, with the numbers of Newton steps, Hessian-vector products and
 /// inner iterations. Rows that exceed the budget are extrapolated from the steps done, by the times that the hybrid scheme takes, and say so.
 #[derive(Parser, Debug)]
-#[command(name = "timing_tables", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -104,7 +167,7 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("Cholesky/step", Fixed(1), "factorizations_per_step"),
 ];
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let (run, quick) = (&options.run, options.run.quick);
     let possible = options.budget.is_finite() && options.budget > 0.0;
     require(possible, "--budget must be positive")?;
@@ -123,7 +186,7 @@ pub fn program(options: &Options) -> Result<()> {
         "networks": checksums.collect::<Result<serde_json::Map<_, _>>>()?,
         "cells": cells, "budget": budget, "steps": STEPS, "mesh": mesh.about,
     });
-    let mut session = Session::open("timing_tables", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let shape = run.either("a disc", "the cross");
     let mut timings = Vec::new();
     for &n in cells {

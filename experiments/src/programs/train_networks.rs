@@ -1,6 +1,6 @@
 use crate::prelude::*;
 use crate::session::remove_folder;
-use crate::training::{NetworkSpec, held_out_radii, in_double_precision, quality};
+use crate::training::{METRICS, NetworkSpec, held_out_radii, in_double_precision, quality};
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
@@ -8,6 +8,37 @@ use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, Checkpoint, CurvePoint, Trained, Training};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
+
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "train_networks",
+    summary: "Trains the networks that ship with the library.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[
+        ResultFolder {
+            name: "train_networks",
+            title: "Training",
+            description: "How the shipped networks were trained, by Levenberg-Marquardt and, for comparison, by the paper's \
+                 Adam.",
+            figures: FIGURES,
+            options: Some("--recipe both --adam-epochs 120"),
+        },
+        ResultFolder {
+            name: "train_n128",
+            title: "Training at n = 128",
+            description: "The network for n = 128 trained once more, with its learning curves.",
+            figures: FIGURES,
+            options: Some("--only n128"),
+        },
+    ],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const FIGURES: Figures = &[(
+    "learning_curves",
+    "Losses on training data and on data held out.",
+)];
 
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(3);
 
@@ -26,8 +57,8 @@ enum Recipe {
 
 /// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 #[derive(Parser, Debug)]
-#[command(name = "train_networks", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 
@@ -56,7 +87,7 @@ impl Recipe {
     }
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let all = match options.recipe {
         Recipe::Accurate => NetworkSpec::ACCURATE,
         Recipe::Lm | Recipe::Adam | Recipe::Both => NetworkSpec::PAPER,
@@ -82,7 +113,7 @@ pub fn program(options: &Options) -> Result<()> {
         "recipe": options.recipe, "networks": chosen,
         "levenberg_marquardt": lm, "adam": adam, "accurate": accurate,
     });
-    let session = Session::open("train_networks", run, parameters)?;
+    let session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut trainings = Trainings {
         checkpoints: session.output.subfolder("checkpoints")?,
         folder: session.output.subfolder("networks")?,

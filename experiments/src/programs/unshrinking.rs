@@ -8,6 +8,59 @@ use rand::{RngExt, SeedableRng};
 use surfaces::{TAUBIN, samples};
 use volumes::{Body, Inside, Volume};
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "unshrinking",
+    summary: "Segmentations without their steps, and their volumes.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "unshrinking",
+        title: "Segmentations",
+        description: "Not in the paper: voxels become smooth surfaces by Willmore flow, with their volume kept and \
+                 without, beside other smoothing.",
+        figures: &[(
+            "surfaces",
+            "The surface by marching tetrahedra, and what becomes of it; the change of the volume.",
+        )],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS],
+    words: &[],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Segmentations",
+    note: "",
+    words: &[
+        ("BODY", "`ball`, with wrong labels; `figure`"),
+        (
+            "TREATMENT",
+            "`marched`, the surface by marching tetrahedra; `fair` and `free`, Willmore flow of the surface of the \
+             voxels, whose staircase is taken off, with the volume kept and without; `marched_fair` and \
+             `marched_free`, the same from the surface `marched`; `taubin` and `laplacian`, smoothing of that with \
+             the best number of iterations",
+        ),
+    ],
+    rows: &[
+        (
+            "unshrinking.BODY.TREATMENT.volume",
+            "change of the volume of the voxels (without specks, with holes of a few voxels) in percent",
+        ),
+        (
+            "unshrinking.BODY.TREATMENT.w_over_8pi",
+            "Willmore energy by implicit finite elements, in units of a sphere's",
+        ),
+        (
+            "unshrinking.BODY.TREATMENT.displacement",
+            "largest distance of the vertices from the surface `marched`, in voxels",
+        ),
+        (
+            "unshrinking.BODY.TREATMENT.rms",
+            "root of the mean square distance of the vertices to the shape, in voxels",
+        ),
+    ],
+};
+
 const TITLE: &str = "Segmentations without their steps, and their volumes";
 /// Bodies with their voxels along the longest side, in quick runs and usually.
 const BODIES: [(&str, [usize; 2]); 2] = [("ball", [16, 32]), ("figure", [24, 48])];
@@ -28,8 +81,8 @@ const ITERATIONS: usize = 200;
 /// that surface, with the volume kept and without, and Taubin's and Laplacian smoothing of it with the number of iterations that comes
 /// nearest to the shape: volumes, energies, displacements.
 #[derive(Parser, Debug)]
-#[command(name = "unshrinking", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
@@ -63,10 +116,10 @@ const COLUMNS: [(&str, Format, &str); 4] = [
     ("distance to the shape", Fixed(4), "rms"),
 ];
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let full = usize::from(!options.run.quick);
     let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
-    let mut session = Session::open("unshrinking", &options.run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, &options.run, parameters)?;
     let seed = session.options.seed;
     let bodies = BODIES.map(|(name, voxels)| Segmented::new(name, voxels[full] as f64, seed));
     let bodies = bodies.into_iter().collect::<Result<Vec<_>, _>>()?;

@@ -4,6 +4,40 @@ use crate::surfaces::{Setting, VIEW, raster};
 use reference::equilibria::{Branch, Vesicle, vesicles};
 use render::{Quality, Scene};
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "vesicles",
+    summary: "Lipid vesicles: area and volume held.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[
+        ResultFolder {
+            name: "vesicles",
+            title: "Vesicles",
+            description: "Not in the paper: surfaces of least bending energy with given area and volume, against exact \
+                 equilibria.",
+            figures: FIGURES,
+            options: Some(""),
+        },
+        ResultFolder {
+            name: "stomatocytes",
+            title: "Stomatocytes",
+            description: "Not in the paper: vesicles that start from exact stomatocytes and stay there.",
+            figures: FIGURES,
+            options: Some("--branches stomatocyte"),
+        },
+    ],
+    metrics: &[&equilibria::METRICS],
+    words: &[],
+};
+
+const FIGURES: Figures = &[
+    ("shapes", "Pictures and sections; blue: the exact profile."),
+    (
+        "diagram",
+        "Energies of the branches along the reduced volume: exact as lines, ours as marks.",
+    ),
+];
+
 const TITLE: &str = "Vesicles: least bending energy with given area and volume";
 /// Shapes of a branch, each flowing from the relaxed one before it.
 struct Family {
@@ -48,8 +82,8 @@ const SIDE: f64 = 2.0;
 /// Willmore flow of spheroids, and of exact stomatocytes, with area and volume held until rest, by the accurate operator, eps = 2h: energies,
 /// profiles and pictures along the reduced volume, against exact axisymmetric equilibria; the phase diagram.
 #[derive(Parser, Debug)]
-#[command(name = "vesicles", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     figure: FigureOptions,
 
@@ -59,7 +93,7 @@ pub struct Options {
     branches: Vec<String>,
 }
 
-pub fn program(options: &Options) -> Result<()> {
+fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let (count, steps) = run.either((1, Some(2)), (usize::MAX, None));
     let wanted = |family: &&Family| options.branches.iter().any(|name| name == family.name);
@@ -70,7 +104,7 @@ pub fn program(options: &Options) -> Result<()> {
         families.push((family, setting));
     }
     let parameters = (families[0].1).parameters(json!({ "families": about }))?;
-    let mut session = Session::open("vesicles", run, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut all: Vec<AtRest<3>> = Vec::new();
     for (family, setting) in &families {
         let (branch, name, radius) = (family.branch, family.name, family.radius);

@@ -4,6 +4,103 @@ use crate::truth::{
     self, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample, Truth,
 };
 
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "work_precision",
+    summary: "Errors of the time steps against the exact flow, and what they cost.",
+    program: |own| own.run(program),
+    quick: Some(&[]),
+    results: &[ResultFolder {
+        name: "work_precision",
+        title: "Time steps against the exact flow",
+        description: "Not in the paper: implicit Euler and steps of second order, equal and controlled, against the exact \
+                 flow of curves and of a surface of revolution.",
+        figures: &[
+            (
+                "work_precision",
+                "Largest distance from the exact curve or surface against Hessian-vector products.",
+            ),
+            ("seconds", "The same against wall time."),
+        ],
+        options: Some(""),
+    }],
+    metrics: &[&METRICS],
+    words: &[("SHAPE", "`cross`, `rectangle`, `ellipse`, `ellipsoid`")],
+};
+
+const METRICS: MetricTable = MetricTable {
+    title: "Time steps against the exact flow",
+    note: "",
+    words: &[(
+        "STEPS",
+        "how time steps are made: `euler0.25`, `euler0.5`, `euler1`, `euler2` and `euler4`, implicit Euler with \
+             so many equal steps in 2^-14; `graded0.4`, `graded0.2` and `graded0.1`, implicit Euler with steps of \
+             that part of the time passed; `second_order0.125`, `second_order0.25`, `second_order0.5`, \
+             `second_order1` and `second_order2`, so many equal steps of second order; `controlled`, second order \
+             with sizes by their estimated error, and `controlled_loose`, `controlled_strict`; `elements0.125`, \
+             `elements0.25` and `elements0.5`, implicit Euler with nested finite elements, so many equal steps",
+    )],
+    rows: &[
+        (
+            "SHAPE.exact.tip.stepK, SHAPE.exact.diagonal.stepK, SHAPE.exact.area.stepK, SHAPE.exact.perimeter.stepK, \
+             SHAPE.exact.volume.stepK, SHAPE.exact.w.stepK",
+            "distances from the centre to the exact curve on the positive x axis and on the diagonal, its area, \
+             length and Willmore energy, at `t = K 2^-14`; of the surface its area, volume and energy",
+        ),
+        (
+            "SHAPE.nN.STEPS.tip.stepK, SHAPE.nN.STEPS.diagonal.stepK, SHAPE.nN.STEPS.area.stepK, \
+             SHAPE.nN.STEPS.perimeter.stepK, SHAPE.nN.STEPS.volume.stepK, SHAPE.nN.STEPS.w.stepK",
+            "the same of the zero set of the phase field, `eps = 2/N`, by coarea sums",
+        ),
+        (
+            "SHAPE.nN.STEPS.distance_to_exact.stepK",
+            "largest distance of the zero level from the exact curve or surface; with graded steps, at the end of the \
+             step in which the time is",
+        ),
+        (
+            "SHAPE.nN.STEPS.estimated_error.stepK",
+            "estimated time error so far, largest over the interface: local errors as delays, at the present rate; \
+             none in the first three steps",
+        ),
+        (
+            "SHAPE.nN.STEPS.steps.stepK, SHAPE.nN.STEPS.hvp_total.stepK, SHAPE.nN.STEPS.seconds.stepK",
+            "time steps, Hessian-vector products and wall time so far",
+        ),
+        (
+            "SHAPE.extrapolated.tip.stepK, SHAPE.extrapolated.diagonal.stepK, SHAPE.extrapolated.area.stepK, \
+             SHAPE.extrapolated.perimeter.stepK, SHAPE.extrapolated.volume.stepK, SHAPE.extrapolated.w.stepK, \
+             SHAPE.extrapolated.distance_to_exact.stepK, SHAPE.extrapolated.estimated_error.stepK",
+            "`(4 b - a) / 3` of strictly controlled runs, of curves with `eps = 1/64` (a) and `1/128` (b), four cells \
+             to each, of the surface with `eps = 1/32` and `1/64`, two cells to each",
+        ),
+        (
+            "SHAPE.extrapolated.steps.stepK, SHAPE.extrapolated.hvp_total.stepK",
+            "time steps and Hessian-vector products of both",
+        ),
+        (
+            "SHAPE.nN.STEPS.time_error.stepK",
+            "the true time error of controlled steps: largest distance from the zero level of the run by \
+             `controlled_strict` with the same `eps`",
+        ),
+        (
+            "estimates.within_factor_3, estimates.least_over_true",
+            "part of these cases in which the estimated error is between a third of the true one and three times \
+             that; the least ratio of the two. Cases with up to three steps, which have no estimate, and true errors \
+             below 1e-5, a thousandth of a cell, do not count",
+        ),
+        (
+            "circles.nN.euler1.l2, circles.nN.controlled.l2, circles.nN.extrapolated.l2",
+            "mean L2 error of the 30 circles of `circle_convergence` after the time `64 2^-14`, accurate operator; \
+             extrapolated: of the circle of radius `(4 b - a) / 3` from controlled runs with `N / 2` (a) and `N` (b) \
+             cells per unit of length",
+        ),
+        (
+            "circles.nN.euler1.hvp_total, circles.nN.controlled.hvp_total, circles.nN.extrapolated.hvp_total",
+            "Hessian-vector products of all of them; extrapolated: of both runs, where those on the coarser grid \
+             count by their share of the unknowns, a quarter",
+        ),
+    ],
+};
+
 const TITLE: &str = "Time steps of Willmore flow against the exact flow";
 
 const CURVES: [Sample<2>; 3] = [CROSS, RECTANGLE, ELLIPSE];
@@ -78,8 +175,8 @@ fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
 /// Willmore flow of a cross, a rectangle and an ellipse by the accurate operator in several kinds of time steps, eps = 2h = 1/32 and 1/64, against
 /// the exact flow of the curves: largest distances, tips, areas, lengths and energies, and the Hessian-vector products they cost.
 #[derive(Parser, Debug)]
-#[command(name = "work_precision", version)]
-pub struct Options {
+#[command(version)]
+struct Options {
     #[command(flatten)]
     run: RunOptions,
 }
@@ -92,11 +189,11 @@ struct Compared<'a> {
     reached: Reached,
 }
 
-pub fn program(Options { run: options }: &Options) -> Result<()> {
+fn program(Options { run: options }: &Options) -> Result<()> {
     let marks = &MARKS[..options.either(1, MARKS.len())];
     let cells = &CELLS[..options.either(1, CELLS.len())];
     let parameters = json!({ "marks": marks, "cells": cells, "time_unit": STEP, "eps_over_h": 2 });
-    let mut session = Session::open("work_precision", options, parameters)?;
+    let mut session = Session::open(EXPERIMENT.name, options, parameters)?;
     let (mut rows, mut ratios) = (Vec::new(), Vec::new());
     let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, time(k))).collect();
     let in_plane = steppings(STEP, options.quick);

@@ -1,17 +1,15 @@
-//! The documents of the repository: every metric is explained, every number of a checked table is that of a summary, and what
-//! they link to and call is there.
+//! The documents of the repository: what follows from the list of experiments is as it says, every metric is explained, every number of a
+//! checked table is that of a summary, and what they link to and call is there.
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
-type Summary = BTreeMap<String, f64>;
+use experiments::derived::{self, root};
+use experiments::metrics;
+use experiments::programs::EXPERIMENTS;
 
-fn root() -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    folder.canonicalize().unwrap()
-}
+type Summary = BTreeMap<String, f64>;
 
 fn read(file: &str) -> String {
     fs::read_to_string(root().join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
@@ -52,160 +50,97 @@ fn cells(line: &str) -> Option<Vec<&str>> {
     Some(inner.split('|').map(str::trim).collect())
 }
 
-/// What the words in capitals stand for: the first table of `results/METRICS.md`. A word without a list stands for numbers.
-struct Words(BTreeMap<String, Vec<String>>);
-
-impl Words {
-    fn of(metrics: &str) -> Self {
-        let lines = metrics.lines().take_while(|line| !line.starts_with("## "));
-        let rows = lines
-            .filter_map(cells)
-            .filter(|row| row[0].starts_with('`'));
-        Self(
-            rows.map(|row| {
-                let number = row[1].starts_with("a number");
-                let values = spans(row[1]).filter(|_| !number).map(str::to_owned);
-                (spans(row[0]).next().unwrap().to_owned(), values.collect())
-            })
-            .collect(),
-        )
+#[test]
+fn what_follows_from_the_list_is_up_to_date() {
+    for (path, text) in derived::files(&root(), EXPERIMENTS).unwrap() {
+        let path_is = path.strip_prefix(root()).unwrap().display();
+        let command = derived::COMMAND;
+        let found = fs::read_to_string(&path).unwrap_or_default();
+        assert!(found == text, "{path_is} is not what `{command}` writes");
     }
-
-    /// The beginnings of a key that a word can stand for.
-    fn beginnings<'a>(&self, word: &str, key: &'a str) -> Vec<&'a str> {
-        let values = self.0.get(word);
-        let values = values.unwrap_or_else(|| panic!("results/METRICS.md does not explain {word}"));
-        let is_number = |c: char| c.is_ascii_digit() || c == '.';
-        let longest = key.find(|c| !is_number(c)).unwrap_or(key.len());
-        let fits = |end: &usize| {
-            let beginning = &key[..*end];
-            match &values[..] {
-                [] => *end <= longest && beginning.parse::<f64>().is_ok(),
-                values => values.iter().any(|value| value == beginning),
-            }
-        };
-        (1..=key.len())
-            .filter(fits)
-            .map(|end| &key[..end])
-            .collect()
+    for file in fs::read_dir(root().join("experiments/src/bin")).unwrap() {
+        let path = file.unwrap().path();
+        let name = path.file_stem().and_then(|stem| stem.to_str());
+        let mut all = EXPERIMENTS.iter();
+        assert!(
+            all.any(|experiment| Some(experiment.name) == name),
+            "src/programs.rs has no experiment for {}",
+            path.display()
+        );
     }
-
-    /// Whether a key is one that a pattern describes.
-    fn matches(&self, pattern: &str, key: &str) -> bool {
-        if let Some((before, rest)) = pattern.split_once('[') {
-            let (optional, after) = rest.split_once(']').expect("a closing bracket");
-            return self.matches(&format!("{before}{after}"), key)
-                || self.matches(&format!("{before}{optional}{after}"), key);
-        }
-        let Some(start) = pattern.find(|c: char| c.is_ascii_uppercase()) else {
-            return pattern == key;
-        };
-        let Some(rest) = key.strip_prefix(&pattern[..start]) else {
-            return false;
-        };
-        let pattern = &pattern[start..];
-        let end = pattern.find(|c: char| !c.is_ascii_uppercase());
-        let (word, tail) = pattern.split_at(end.unwrap_or(pattern.len()));
-        let beginnings = self.beginnings(word, rest).into_iter();
-        beginnings
-            .map(|beginning| &rest[beginning.len()..])
-            .any(|rest| self.matches(tail, rest))
+    for file in fs::read_dir(root().join("experiments/src/programs")).unwrap() {
+        let name = file.unwrap().file_name().into_string().unwrap();
+        let mut all = EXPERIMENTS.iter();
+        assert!(
+            all.any(|experiment| name == format!("{}.rs", experiment.name)),
+            "src/programs.rs does not declare {name}"
+        );
     }
 }
 
 #[test]
-fn patterns_of_metrics() {
-    let words =
-        Words::of("| `N` | a number `x` |\n| `METHOD` | `hybrid`; `hybrid_accurate`, b |\n");
-    for (pattern, key, fits) in [
-        ("a.nN.l2.stepN", "a.n128.l2.step64", true),
-        ("a.nN.l2.stepN", "a.n128.l2.step", false),
-        ("a.nN.l2", "a.n128.l2.step64", false),
-        ("noiseN.fair", "noise0.3.fair", true),
-        ("noiseN.fair", "noise0.3.0.fair", false),
-        ("a[.METHOD].w", "a.w", true),
-        ("a[.METHOD].w", "a.hybrid_accurate.w", true),
-        ("a[.METHOD].w", "a.fe.w", false),
-    ] {
-        assert_eq!(words.matches(pattern, key), fits, "{pattern} and {key}");
-    }
-}
-
-/// A row of `results/METRICS.md`: folders of results that have such metrics, and their patterns.
-struct Entry<'a> {
-    folders: Vec<&'a str>,
-    patterns: Vec<&'a str>,
-    line: &'a str,
-}
-
-/// The folders are those that the heading names, or all.
-fn entries<'a>(text: &'a str, summaries: &'a BTreeMap<String, Summary>) -> Vec<Entry<'a>> {
-    let mut entries = Vec::new();
-    let mut folders: Option<Vec<&str>> = None;
-    for line in text.lines() {
-        if let Some(title) = line.strip_prefix("## ") {
-            let named: Vec<&str> = spans(title).collect();
-            let all = || summaries.keys().map(String::as_str).collect();
-            folders = Some(if named.is_empty() { all() } else { named });
-        } else if let (Some(folders), Some(row)) = (&folders, cells(line))
-            && row[0].starts_with('`')
-        {
-            entries.push(Entry {
-                folders: folders.clone(),
-                patterns: spans(row[0]).collect(),
-                line,
-            });
+fn the_results_are_those_of_the_experiments() {
+    let summaries = summaries();
+    let mut folders: Vec<&str> = Vec::new();
+    for experiment in EXPERIMENTS {
+        let mut usual = true;
+        for folder in experiment.results {
+            let name = folder.name;
+            assert!(!folder.figures.is_empty(), "{name} has no figures");
+            assert!(!folders.contains(&name), "{name} is there twice");
+            assert_eq!(name == experiment.name, usual, "{name} in the wrong place");
+            assert!(
+                summaries.contains_key(name),
+                "results/{name} has no summary"
+            );
+            folders.push(name);
+            usual = false;
         }
     }
-    entries
+    for folder in summaries.keys() {
+        let message = "is not among the results of an experiment";
+        assert!(folders.contains(&&folder[..]), "results/{folder} {message}");
+    }
+    let runs = derived::runs(&root(), EXPERIMENTS);
+    assert!(runs.contains(&"stomatocytes vesicles --branches stomatocyte".to_owned()));
 }
 
 #[test]
 fn every_metric_is_explained_and_every_explanation_is_of_a_metric() {
-    let text = read("results/METRICS.md");
-    let (words, summaries) = (Words::of(&text), summaries());
-    let entries = entries(&text, &summaries);
-    let fits = |entry: &Entry, folder: &str, key: &str| {
-        let mut patterns = entry.patterns.iter();
-        entry.folders.contains(&folder) && patterns.any(|pattern| words.matches(pattern, key))
-    };
-    let metrics = || {
-        let all = summaries.iter();
-        all.flat_map(|(folder, summary)| summary.keys().map(|key| (&folder[..], &key[..])))
-    };
-    for (folder, key) in metrics() {
-        assert!(
-            entries.iter().any(|entry| fits(entry, folder, key)),
-            "results/METRICS.md does not explain {key} of results/{folder}"
-        );
-    }
-    for entry in &entries {
-        assert!(
-            metrics().any(|(folder, key)| fits(entry, folder, key)),
-            "no summary has a metric of this row of results/METRICS.md: {}",
-            entry.line
-        );
-        for folder in &entry.folders {
-            assert!(
-                summaries.contains_key(*folder),
-                "results/{folder} has no summary"
-            );
+    let summaries = summaries();
+    let mut all: Vec<&str> = Vec::new();
+    for experiment in EXPERIMENTS {
+        for folder in experiment.results {
+            for metric in summaries[folder.name].keys() {
+                assert!(
+                    metrics::is_explained(experiment, metric),
+                    "the tables of {} do not explain {metric} of results/{}",
+                    experiment.name,
+                    folder.name
+                );
+                all.push(metric);
+            }
         }
     }
-    for value in words.0.values().flatten() {
-        assert!(
-            metrics().any(|(_, key)| format!(".{key}.").contains(&format!(".{value}."))),
-            "no summary has a metric with {value}"
-        );
+    let tables = || EXPERIMENTS.iter().flat_map(|one| one.metrics);
+    for table in tables() {
+        let mut same = tables().filter(|other| other.title == table.title);
+        let title = table.title;
+        assert!(same.all(|other| other.rows == table.rows), "two of {title}");
     }
-}
-
-#[test]
-fn all_results_are_in_the_catalogue() {
-    let catalogue = read("crates/pages/assets/catalogue.toml");
-    for folder in summaries().keys() {
-        let entry = format!("folder = \"{folder}\"\n");
-        assert!(catalogue.contains(&entry), "{folder} is not");
+    let names = |folder: &str| summaries[folder].keys().map(String::as_str).collect();
+    let unused = metrics::unused_rows(EXPERIMENTS, names);
+    assert!(unused.is_empty(), "no summary has metrics of {unused:?}");
+    for (word, meaning) in EXPERIMENTS.iter().flat_map(|one| metrics::words(one)) {
+        let is_kept = |value: &&str| !meaning.contains(&format!("`{value}` in quick runs"));
+        let values = metrics::values(meaning).filter(|_| !metrics::is_number(meaning));
+        for value in values.filter(is_kept) {
+            let part = format!(".{value}.");
+            assert!(
+                all.iter().any(|name| format!(".{name}.").contains(&part)),
+                "no summary has a metric with {value} for {word}"
+            );
+        }
     }
 }
 
@@ -343,15 +278,13 @@ fn commands_and_paths_are_there() {
 }
 
 #[test]
-fn the_readme_has_every_program_and_the_command_of_the_tests() {
+fn the_readme_has_programs_that_are_there_and_the_command_of_the_tests() {
     let readme = read("README.md");
-    for program in fs::read_dir(root().join("experiments/src/bin")).unwrap() {
-        let path = program.unwrap().path();
-        let name = path.file_stem().unwrap().to_str().unwrap();
-        assert!(
-            readme.contains(&format!("`{name}`")),
-            "{name} is not in README.md"
-        );
+    let rows = readme.split("| program |").nth(1).unwrap().lines().skip(2);
+    let rows = rows.map_while(cells);
+    for name in rows.flat_map(|row| spans(row[0]).collect::<Vec<_>>()) {
+        let mut all = EXPERIMENTS.iter();
+        assert!(all.any(|one| one.name == name), "{name} is no experiment");
     }
     let command = readme.lines().find(|line| line.starts_with("cargo test"));
     let command = command
