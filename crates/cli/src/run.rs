@@ -239,7 +239,7 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
 
     fn tell(&self, run: &Run<D>, mut outcome: Value, folder: &Path, seconds: f64) -> Result<()> {
         let (progress, ended) = (outcome::progress(run.steps(), run.time()), run.ended());
-        let reason = match ended {
+        let reason = match &ended {
             None | Some(Stop::Steps(_)) => String::new(),
             Some(stop) => format!(": {stop}"),
         };
