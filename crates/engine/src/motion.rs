@@ -130,7 +130,7 @@ fn make<const D: usize>(
     };
     if case.flow == Flow::Willmore {
         if !case.energy.is_willmore() {
-            flow.set_energy(case.energy, operator.response)?;
+            flow.set_energy(case.energy.terms()?, operator.response)?;
         }
         if let Some(region) = &case.region {
             flow.restrict_to(region)?;

@@ -17,8 +17,8 @@ use crate::region::Region;
 use crate::stored::tensor;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep,
-    MinimizingMovement,
+    Accuracy, Domain, DomainScales, EnergyTerms, Error, Exit, FlowParams, MeanCurvatureStep,
+    MinimizingMovement, MovementGraph,
 };
 
 mod bricks;
@@ -43,7 +43,7 @@ pub struct StepRecord {
     /// `E[u_k, u_{k+1}]`.
     pub energy: f64,
     /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration. With spontaneous
-    /// curvature, tension or pressure the [energy](Helfrich) that these make of it.
+    /// curvature, tension, pressure or other [terms](crate::EnergyTerm) the energy that these make of it.
     pub willmore_energy: f64,
     /// Where the minimization began.
     pub start: Start,
@@ -51,7 +51,7 @@ pub struct StepRecord {
     pub newton: NewtonInfo,
     /// The surface tension `sigma` that holds the perimeter: `w + sigma A + p V` is stationary but for the motion, `w` being the Willmore
     /// energy, `A` the perimeter, and `V` the volume. Energy per length (2D) or area (3D); positive where the interface wants to grow. It comes
-    /// on top of the tension in [`Helfrich`].
+    /// on top of a [tension](crate::Tension) in the energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tension: Option<f64>,
     /// The pressure `p` that holds the volume, likewise: energy per area (2D) or volume (3D), positive where the inside wants to grow.
@@ -114,7 +114,9 @@ pub struct WillmoreFlow<const D: usize> {
     /// The energy, and the same with weights of the motion, each traced when it is first minimized.
     energies: [Option<MinimizingMovement<D>>; 2],
     /// What it has besides bending.
-    terms: Option<HelfrichTerms<D>>,
+    terms: EnergyTerms<D>,
+    /// The motion of the step of mean curvature flow over that of the calibration, as they see it.
+    response: f64,
     phase: Option<(f64, PhaseInverse<D>)>,
     region: Option<Region<D>>,
     constraints: Constraints,
@@ -211,7 +213,8 @@ impl<const D: usize> WillmoreFlow<D> {
             active,
             mcf,
             energies: [None, None],
-            terms: None,
+            terms: Vec::new(),
+            response: 1.0,
             phase: None,
             region: None,
             constraints: Constraints::default(),
@@ -246,37 +249,46 @@ impl<const D: usize> WillmoreFlow<D> {
         Ok(())
     }
 
-    /// Makes this the energy of all following steps, by a step of mean curvature flow whose motion is `response` times that of the calibration
-    /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
+    /// Makes bending and these terms the energy of all following steps, by a step of mean curvature flow whose motion is `response` times that of
+    /// the calibration (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for values that are not finite.
-    pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
-        self.terms = if energy.is_willmore() {
-            None
-        } else {
-            let (grid, device) = (&self.grid, &self.device);
-            let terms = HelfrichTerms::new(energy, response, &self.params, grid, device)?;
-            Some(match &self.active {
-                Some(active) => terms.on(active, device),
-                None => terms,
-            })
-        };
+    /// [`Error::Geometry`] unless the response is positive; what the terms raise at the phase field now.
+    pub fn set_energy(&mut self, terms: EnergyTerms<D>, response: f64) -> Result<(), Error> {
+        self.response = geometry::positive("response", response)?;
+        // What does not fit is refused now, not in the first step.
+        let domain = self.domain();
+        for term in &terms {
+            term.energy(&self.current, &domain)?;
+            term.shift(&self.current, &domain)?;
+        }
+        self.terms.clone_from(&terms);
         self.energies = [None, None];
         match &mut self.half {
-            Some(half) => half.set_energy(energy, response),
+            Some(half) => half.set_energy(terms, response),
             None => Ok(()),
         }
     }
 
+    /// Where the values are stored, as terms of the energy see it.
+    fn domain(&self) -> Domain<D> {
+        let scales = DomainScales {
+            eps: self.params.eps,
+            inner_step: self.params.mcf_step,
+            response: self.response,
+        };
+        Domain::new(self.nodes(), self.rests(), scales, &self.device)
+    }
+
     fn traced(&self, weighted: bool) -> Result<MinimizingMovement<D>, Error> {
-        MinimizingMovement::with_terms(
-            self.mcf.clone(),
-            self.current.dims(),
-            self.params.newton.precision,
-            (weighted, self.terms.as_ref()),
-            &self.device,
-        )
+        MinimizingMovement::traced(MovementGraph {
+            step: self.mcf.clone(),
+            domain: &self.domain(),
+            terms: &self.terms,
+            unit: self.params.energy_unit(),
+            products: self.params.newton.precision,
+            weighted,
+        })
     }
 
     /// How many cells of the phase field are stored: those of the grid, or of the active bricks.

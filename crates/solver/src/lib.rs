@@ -29,7 +29,7 @@
 //!
 //! [`MinimizingMovement`] is the energy of a step as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its
 //! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`Method::Preconditioned`]), the
-//! constraints ([`WillmoreFlow::constrain`]) and the further terms of the energy ([`WillmoreFlow::set_energy`]) are explained in
+//! constraints ([`WillmoreFlow::constrain`]) and the further terms of the energy ([`EnergyTerm`], [`WillmoreFlow::set_energy`]) are explained in
 //! `docs/algorithm.md`.
 //!
 //! # Conventions
@@ -46,10 +46,11 @@ mod cg;
 mod constraints;
 mod displacement;
 mod dissection;
+mod domain;
 mod energy;
 mod error;
 mod flow;
-mod helfrich;
+mod identity;
 mod interface;
 mod newton;
 mod params;
@@ -62,10 +63,14 @@ mod times;
 
 pub use constraints::Constraints;
 pub use displacement::widths_between;
-pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
+pub use domain::{Domain, DomainScales};
+pub use energy::{
+    Accuracy, EnergyTerm, EnergyTerms, Helfrich, MeanCurvatureStep, MinimizingMovement,
+    MovementGraph, Objective, Pressure, SpontaneousCurvature, Tension,
+};
 pub use error::{Error, StepFailure};
 pub use flow::{FlowState, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow};
-pub use helfrich::{Helfrich, HelfrichTerms};
+pub use identity::Identity;
 pub use model::Factors;
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};

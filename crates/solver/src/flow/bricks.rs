@@ -79,7 +79,6 @@ impl<const D: usize> WillmoreFlow<D> {
         self.current = current;
         self.previous = previous;
         self.mcf = Arc::new(next.step(&self.device));
-        self.terms = self.terms.take().map(|terms| terms.on(&next, &self.device));
         self.active = Some(next);
         // What it was prepared for belongs to the step of mean curvature flow.
         self.phase = None;
@@ -91,6 +90,11 @@ impl<const D: usize> WillmoreFlow<D> {
     pub(super) fn nodes(&self) -> Nodes<D> {
         let whole = || self.grid.into();
         self.active.as_ref().map_or_else(whole, Active::nodes)
+    }
+
+    /// The values in the negative and in the positive phase, where nothing is stored.
+    pub(super) fn rests(&self) -> [f64; 2] {
+        self.active.as_ref().map_or([-1.0, 1.0], Active::rests)
     }
 
     /// A phase field that is stored as the present one is, for arithmetic.
