@@ -15,7 +15,7 @@ use model::{MeanCurvatureOperator, Network};
 use operators::{SpectralFilter, Transform, kernel_symbol, spectral_filter};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
-use solver::{MinimizingMovement, Objective, Precision};
+use solver::{Domain, DomainScales, MinimizingMovement, MovementGraph, Objective, Precision};
 
 use crate::prelude::*;
 use crate::timing;
@@ -92,10 +92,22 @@ pub fn measure<const D: usize>(
     let tensor = |x: &[f64]| -> Tensor<D> { device.tensor(x, grid.shape()) };
     let previous: Vec<f64> = u.values().iter().map(|u| 0.99 * u).collect();
     let operator = Arc::new(MeanCurvatureOperator::<D>::new(network, device)?);
+    let (ratios, h) = (network.ratios(), grid.spacing());
+    let scales = DomainScales {
+        eps: ratios.eps_over_h * h,
+        inner_step: ratios.step_over_h2 * h * h,
+        response: 1.0,
+    };
+    let domain = Domain::new(grid.into(), [-1.0, 1.0], scales, device);
     let energy = |precision| -> Result<_> {
-        let (operator, shape) = (operator.clone(), grid.shape());
-        let mut energy =
-            MinimizingMovement::with_terms(operator, shape, precision, (false, None), device)?;
+        let mut energy = MinimizingMovement::traced(MovementGraph {
+            step: operator.clone(),
+            domain: &domain,
+            terms: &[],
+            unit: 1.0,
+            products: precision,
+            weighted: false,
+        })?;
         energy.set(&tensor(&previous), STIFFNESS)?;
         energy.evaluate(&tensor(u.values()))?;
         Ok(energy)

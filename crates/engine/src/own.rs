@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
-use solver::Scheme;
+use solver::{EnergyTerm, EnergyTerms, Identity, Scheme};
 
 use crate::{Case, Controller, Error, StopRule};
 
@@ -17,6 +17,8 @@ pub type MakeController<const D: usize> =
 /// Parts of a case that are one's own; none by default. A run with them has all that the loop offers. It is resumed by a program that has them, too.
 #[derive(Clone, Default)]
 pub struct Own<const D: usize> {
+    /// Terms of the energy of Willmore flow, beside those of the case.
+    pub terms: EnergyTerms<D>,
     /// In place of the scheme that [`TimeSteps::order`](crate::TimeSteps::order) names.
     pub scheme: Option<MakeScheme<D>>,
     /// In place of the [`StepControl`](crate::StepControl) of the case's time steps.
@@ -26,6 +28,13 @@ pub struct Own<const D: usize> {
 }
 
 impl<const D: usize> Own<D> {
+    /// Adds a term of the energy.
+    #[must_use]
+    pub fn with_term(mut self, term: impl EnergyTerm<D> + 'static) -> Self {
+        self.terms.push(Arc::new(term));
+        self
+    }
+
     /// Takes a scheme.
     #[must_use]
     pub fn with_scheme<S: Scheme<D> + 'static>(
@@ -56,6 +65,11 @@ impl<const D: usize> Own<D> {
     /// The names of these parts, for the identity of a case.
     pub(crate) fn identity(&self, case: &Case<D>) -> Map<String, Value> {
         let mut identity = Map::new();
+        if !self.terms.is_empty() {
+            let terms: Vec<Identity> = self.terms.iter().map(|term| term.identity()).collect();
+            identity.insert("own_terms".to_owned(), json!(terms));
+            identity.insert("response".to_owned(), json!(case.operator.response));
+        }
         if let Some(make) = &self.scheme {
             identity.insert("own_scheme".to_owned(), json!(make().name()));
         }
@@ -74,7 +88,9 @@ impl<const D: usize> Own<D> {
 impl<const D: usize> std::fmt::Debug for Own<D> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let stops: Vec<&str> = self.stops.iter().map(|rule| rule.name()).collect();
+        let terms: Vec<Identity> = self.terms.iter().map(|term| term.identity()).collect();
         f.debug_struct("Own")
+            .field("terms", &terms)
             .field(
                 "scheme",
                 &self.scheme.as_ref().map(|make| make().name().to_owned()),

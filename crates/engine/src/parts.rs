@@ -98,8 +98,10 @@ fn willmore<const D: usize>(
     if case.operator.half_grids && start.field.nodes().bricks().is_none() {
         problem.begin_on_half_grids()?;
     }
-    if !case.energy.is_willmore() {
-        problem.set_energy(case.energy, case.operator.response)?;
+    let mut terms = case.energy.terms()?;
+    terms.extend(case.own.terms.iter().cloned());
+    if !terms.is_empty() {
+        problem.set_energy(terms, case.operator.response)?;
     }
     if let Some(region) = &case.region {
         problem.restrict_to(region)?;

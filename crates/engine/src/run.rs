@@ -216,7 +216,7 @@ impl<const D: usize> Run<D> {
             initial: &case.initial,
             current: self.current(),
             steps: self.steps(),
-            is_willmore: case.energy.is_willmore(),
+            is_willmore: case.energy.is_willmore() && case.own.terms.is_empty(),
         };
         let driven = !case.held.is_reached(self.state.progress);
         let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));

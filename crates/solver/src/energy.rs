@@ -3,13 +3,19 @@
 use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor};
-use geometry::Nodes;
-use linearize::{Graph, Linearization, Value};
+use geometry::{Grid, Nodes};
+use linearize::{Extensions, Graph, Inputs, Linearization, Value};
 use model::{BrickOperator, Factors, MeanCurvatureOperator};
 use operators::{ComputeDevice, spectral_filter};
 
 use crate::error::StepFailure;
-use crate::{Error, HelfrichTerms, PhaseInverse, Precision};
+use crate::{Domain, DomainScales, Error, PhaseInverse, Precision};
+
+mod helfrich;
+mod term;
+
+pub use helfrich::{Helfrich, Pressure, SpontaneousCurvature, Tension};
+pub use term::{EnergyTerm, EnergyTerms};
 
 /// A step of mean curvature flow, `v[u]`, as the energy sees it.
 ///
@@ -144,12 +150,30 @@ pub trait Objective<const D: usize> {
     fn unit(&self) -> f64;
 }
 
+/// What the energy of a minimizing movement is made of.
+pub struct MovementGraph<'a, const D: usize> {
+    /// The step of mean curvature flow.
+    pub step: Arc<dyn MeanCurvatureStep<D>>,
+    /// Where the values are stored.
+    pub domain: &'a Domain<D>,
+    /// What the energy has besides bending.
+    pub terms: &'a [Arc<dyn EnergyTerm<D>>],
+    /// The factor that makes of these energies per area or volume what `1/2 (V[u] - u)^2` is in each node,
+    /// [`FlowParams::energy_unit`](crate::FlowParams::energy_unit).
+    pub unit: f64,
+    /// The precision of Hessian-vector products, if the step allows single precision.
+    pub products: Precision,
+    /// Whether the motion has factors.
+    pub weighted: bool,
+}
+
 /// The energy of one minimizing movement, scaled by `N / (2 eps)`:
 ///
-/// `E(u) = 1/2 |u - a|^2 + c/2 |V[u] - u|^2`, with sums over the grid in the step's inner product and
+/// `E(u) = 1/2 |u - a|^2 + c/2 (|V[u] - u + b(u)|^2 + 2 unit/h^D e(u))`, with sums over the grid in the step's inner product and
 /// the [stiffness](crate::FlowParams::stiffness) `c`,
 ///
-/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds; [`HelfrichTerms`] change the second term. The anchor `a` is `u_k` in an implicit Euler step.
+/// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. The shifts `b` and energies `e` are those of the
+/// [terms](EnergyTerm), if there are such. The anchor `a` is `u_k` in an implicit Euler step.
 /// Stages of second-order steps have other anchors, and weigh the motion by positive numbers that are fixed during the minimization:
 /// `1/2 |s (u - a)|^2`. Anchor, `c` and `s` are inputs of the traced graph: one trace serves a whole run.
 pub struct MinimizingMovement<const D: usize> {
@@ -163,62 +187,123 @@ pub struct MinimizingMovement<const D: usize> {
     factors: Option<Value>,
 }
 
+impl<const D: usize> MovementGraph<'_, D> {
+    /// The energy at the inputs of a graph: `u` of the anchor, the stiffness, and the factors if the motion is weighted.
+    fn energy(&self, inputs: &Inputs) -> Result<Tensor<1>, Error> {
+        let u = inputs.variable::<D>(0);
+        let mut motion = u.clone() - inputs.parameter::<D>(0);
+        if self.weighted {
+            motion = motion * inputs.parameter::<D>(2);
+        }
+        let domain = self.domain.at(&u.device());
+        let residual = self.step.apply(u.clone()) - u.clone();
+        let residual = term::shifted(residual, self.terms, &u, &domain)?;
+        let square = |x: Tensor<D>| (x.clone() * self.step.mass(x)).sum();
+        let mut curvature = square(residual);
+        if let Some(energies) = term::energies(self.terms, &u, &domain)? {
+            curvature = curvature + energies * (2.0 * self.unit / domain.cell_volume());
+        }
+        Ok((square(motion) + curvature * inputs.parameter::<1>(1)) * 0.5)
+    }
+
+    /// The error of linearizing, with the name of the term that contains an operation without a rule, if one does.
+    fn error(&self, error: linearize::Error, u: &Value, extensions: &Extensions) -> Error {
+        if !matches!(error, linearize::Error::NoRule { .. }) {
+            return error.into();
+        }
+        for term in self.terms {
+            let graph = graph_of(std::slice::from_ref(u), &[], |inputs| {
+                let u = inputs.variable::<D>(0);
+                let domain = self.domain.at(&u.device());
+                let parts = [
+                    term.energy(&u, &domain)?,
+                    term.shift(&u, &domain)?.map(Tensor::sum),
+                ];
+                let sum = parts.into_iter().flatten().reduce(|a, b| a + b);
+                Ok(sum.unwrap_or_else(|| u.sum()))
+            });
+            let alone = graph.map(|graph| graph.linearize(extensions, None));
+            if let Ok(Err(source)) = alone {
+                let name = term.identity().name;
+                return Error::Term { name, source };
+            }
+        }
+        error.into()
+    }
+}
+
+/// The graph of a function that can fail, with its gradient.
+fn graph_of(
+    variables: &[Value],
+    parameters: &[Value],
+    function: impl Fn(&Inputs) -> Result<Tensor<1>, Error>,
+) -> Result<Graph, Error> {
+    let mut failure = None;
+    let graph = Graph::gradient(variables, parameters, |inputs| {
+        function(inputs).unwrap_or_else(|error| {
+            failure = Some(error);
+            Tensor::zeros([1], &inputs.device())
+        })
+    });
+    match failure {
+        Some(error) => Err(error),
+        None => Ok(graph?),
+    }
+}
+
 impl<const D: usize> MinimizingMovement<D> {
-    /// Traces the energy for grids of `cells^D` and loads it on the device. Hessian-vector products have the device's precision.
+    /// The energy of bending for grids of `cells^D`, on the device. Hessian-vector products have the device's precision.
     ///
     /// # Errors
-    /// [`Error::Linearize`] if the step contains an operation without a rule.
+    /// As [`Self::traced`].
     pub fn new(
         step: Arc<dyn MeanCurvatureStep<D>>,
         cells: usize,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let shape = [cells; D];
-        Self::with_terms(step, shape, Precision::Device, (false, None), device)
+        // The energy of bending has no scales of its own.
+        let grid = Grid::new(cells, 1.0)?;
+        let scales = DomainScales {
+            eps: 1.0,
+            inner_step: 1.0,
+            response: 1.0,
+        };
+        let domain = Domain::new(grid.into(), [-1.0, 1.0], scales, device);
+        Self::traced(MovementGraph {
+            step,
+            domain: &domain,
+            terms: &[],
+            unit: 1.0,
+            products: Precision::Device,
+            weighted: false,
+        })
     }
 
-    /// As [`Self::new`], for tensors of any shape that the step takes, such as that of active bricks; with Hessian-vector products in single
-    /// precision if asked for and if the step allows it; with factors of the motion if `weighted`; and with spontaneous curvature, tension and
-    /// pressure, if there are such.
-    pub fn with_terms(
-        step: Arc<dyn MeanCurvatureStep<D>>,
-        shape: [usize; D],
-        products: Precision,
-        (weighted, terms): (bool, Option<&HelfrichTerms<D>>),
-        device: &ComputeDevice,
-    ) -> Result<Self, Error> {
+    /// Traces the energy and loads it on the device of the domain.
+    ///
+    /// # Errors
+    /// [`Error::Term`] if a term, [`Error::Linearize`] if the step contains an operation without a rule; what the terms raise.
+    pub fn traced(graph: MovementGraph<'_, D>) -> Result<Self, Error> {
+        let (device, shape) = (graph.domain.device().clone(), graph.domain.shape());
         let options = (device.device(), device.dtype());
         let anchor = Value::from(Tensor::<D>::zeros(shape, options));
         let stiffness = Value::from(device.tensor::<1>(&[1.0], [1]));
-        let factors = weighted.then(|| Value::from(Tensor::<D>::ones(shape, options)));
+        let factors = (graph.weighted).then(|| Value::from(Tensor::<D>::ones(shape, options)));
         let mut parameters = vec![anchor.clone(), stiffness.clone()];
         parameters.extend(factors.clone());
-        let graph = Graph::gradient(std::slice::from_ref(&anchor), &parameters, |inputs| {
-            let u = inputs.variable::<D>(0);
-            let mut motion = u.clone() - inputs.parameter::<D>(0);
-            if weighted {
-                motion = motion * inputs.parameter::<D>(2);
-            }
-            let mut residual = step.apply(u.clone()) - u.clone();
-            if let Some(terms) = terms {
-                residual = terms.shifted(residual, &u);
-            }
-            let square = |x: Tensor<D>| (x.clone() * step.mass(x)).sum();
-            let mut curvature = square(residual);
-            if let Some(sizes) = terms.and_then(|terms| terms.sizes(&u)) {
-                curvature = curvature + sizes * 2.0;
-            }
-            (square(motion) + curvature * inputs.parameter::<1>(1)) * 0.5
+        let energy = graph_of(std::slice::from_ref(&anchor), &parameters, |inputs| {
+            graph.energy(inputs)
         })?;
-        let extensions = step.extensions();
-        let single = products == Precision::Single && step.allows_single_precision();
+        let extensions = graph.step.extensions();
+        let single = graph.products == Precision::Single && graph.step.allows_single_precision();
         let product_dtype = (single && device.dtype() != DType::F32).then_some(DType::F32);
-        let program = graph.linearize(&extensions, product_dtype)?;
+        let program = (energy.linearize(&extensions, product_dtype))
+            .map_err(|error| graph.error(error, &anchor, &extensions))?;
         Ok(Self {
             linearization: program.on(device.device(), &extensions)?,
             product_dtype,
-            step,
-            device: device.clone(),
+            step: graph.step,
+            device,
             anchor,
             stiffness,
             factors,

@@ -74,6 +74,11 @@ pub enum Error {
     NeedsGrid { what: &'static str },
     #[error("the step of mean curvature flow failed: {0}")]
     Step(StepFailure),
+    #[error("the term `{name}` of the energy has no derivatives")]
+    Term {
+        name: String,
+        source: linearize::Error,
+    },
     #[error(transparent)]
     Model(#[from] model::Error),
     #[error(transparent)]

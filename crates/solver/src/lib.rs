@@ -31,7 +31,7 @@
 //!
 //! [`MinimizingMovement`] is the energy of a step as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its
 //! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`Method::Preconditioned`]), the
-//! held sizes ([`Problem::hold`]) and the further terms of the energy ([`Problem::set_energy`]) are explained in
+//! held sizes ([`Problem::hold`]) and the further terms of the energy ([`EnergyTerm`], [`Problem::set_energy`]) are explained in
 //! `docs/algorithm.md`.
 //!
 //! # Conventions
@@ -48,11 +48,11 @@ mod cg;
 mod constraints;
 mod displacement;
 mod dissection;
+mod domain;
 mod energy;
 mod error;
 mod euler;
 mod held;
-mod helfrich;
 mod identity;
 mod interface;
 mod learned;
@@ -75,11 +75,14 @@ mod times;
 
 pub use constraints::Constraints;
 pub use displacement::widths_between;
-pub use energy::{Accuracy, Coarser, MeanCurvatureStep, MinimizingMovement, Objective};
+pub use domain::{Domain, DomainScales};
+pub use energy::{
+    Accuracy, Coarser, EnergyTerm, EnergyTerms, Helfrich, MeanCurvatureStep, MinimizingMovement,
+    MovementGraph, Objective, Pressure, SpontaneousCurvature, Tension,
+};
 pub use error::{Error, StepFailure};
 pub use euler::Euler;
 pub use held::{Held, Target};
-pub use helfrich::{Helfrich, HelfrichTerms};
 pub use identity::Identity;
 pub use learned::LearnedStep;
 pub use mean_curvature::MeanCurvature;

@@ -11,8 +11,8 @@ use crate::preconditioner::{PhaseInverse, Preconditioner};
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, DeviceField, Error, Exit, FlowParams, Helfrich, HelfrichTerms, MeanCurvatureStep,
-    MinimizingMovement, Problem, State, bricks,
+    Accuracy, DeviceField, Domain, EnergyTerms, Error, Exit, FlowParams, MeanCurvatureStep,
+    MinimizingMovement, MovementGraph, Problem, State, bricks,
 };
 
 /// One minimization, of `1/2 |s (u - a)|^2` and the weighted energy.
@@ -84,11 +84,12 @@ struct Prepared<const D: usize> {
     /// Of the problem: its parameters, operator, energy and region.
     params: FlowParams,
     operator: Arc<dyn MeanCurvatureStep<D>>,
-    energy: (Helfrich, u64),
+    terms: EnergyTerms<D>,
+    response: u64,
     nodes_that_move: Option<Arc<NodeSet>>,
     step: Arc<dyn MeanCurvatureStep<D>>,
     region: Option<Region<D>>,
-    terms: Option<HelfrichTerms<D>>,
+    domain: Domain<D>,
     /// The energy, and the one with factors of the motion, each traced when it is first minimized.
     energies: [Option<MinimizingMovement<D>>; 2],
     /// The inverse in the pure phases for a stiffness.
@@ -158,7 +159,7 @@ impl<const D: usize> Minimizations<D> {
             interface: None,
         };
         let inner = prepared.step.clone();
-        let (energy, region) = prepared.energy(problem, movement, stiffness)?;
+        let (energy, region) = prepared.energy(movement, stiffness)?;
         let mut held = Restoring::new(&movement.targets, current, params.eps, region);
         let minimized = minimize_timed(
             energy,
@@ -207,11 +208,12 @@ impl<const D: usize> Prepared<D> {
             nodes: nodes.clone(),
             params: problem.params,
             operator: problem.operator.clone(),
-            energy: (problem.energy, problem.response.to_bits()),
+            terms: problem.terms.clone(),
+            response: problem.response.to_bits(),
             nodes_that_move: problem.region.clone(),
             step,
             region,
-            terms: problem.terms_on(nodes)?,
+            domain: problem.domain(nodes),
             energies: [None, None],
             phase: None,
         })
@@ -223,10 +225,16 @@ impl<const D: usize> Prepared<D> {
             (Some(own), Some(other)) => Arc::ptr_eq(own, other),
             (own, other) => own.is_none() && other.is_none(),
         };
+        let terms = self.terms.iter().zip(&problem.terms);
+        let same_terms = self.terms.len() == problem.terms.len()
+            && terms
+                .into_iter()
+                .all(|(own, other)| Arc::ptr_eq(own, other));
         same_region
             && self.params == problem.params
             && Arc::ptr_eq(&self.operator, &problem.operator)
-            && self.energy == (problem.energy, problem.response.to_bits())
+            && self.response == problem.response.to_bits()
+            && same_terms
             && self.nodes == *nodes
     }
 
@@ -251,7 +259,6 @@ impl<const D: usize> Prepared<D> {
     /// The energy of a movement, and the region in which values move.
     fn energy(
         &mut self,
-        problem: &Problem<D>,
         movement: &Movement<D>,
         stiffness: f64,
     ) -> Result<(&mut MinimizingMovement<D>, Option<&Region<D>>), Error> {
@@ -259,13 +266,14 @@ impl<const D: usize> Prepared<D> {
         let energy = &mut self.energies[usize::from(factors.is_some())];
         let traced = match energy.take() {
             Some(traced) => traced,
-            None => MinimizingMovement::with_terms(
-                self.step.clone(),
-                anchor.dims(),
-                problem.params.newton.precision,
-                (factors.is_some(), self.terms.as_ref()),
-                &problem.device,
-            )?,
+            None => MinimizingMovement::traced(MovementGraph {
+                step: self.step.clone(),
+                domain: &self.domain,
+                terms: &self.terms,
+                unit: self.params.energy_unit(),
+                products: self.params.newton.precision,
+                weighted: factors.is_some(),
+            })?,
         };
         let energy = energy.insert(traced);
         if let Some(factors) = factors {

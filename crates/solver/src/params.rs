@@ -51,6 +51,12 @@ impl FlowParams {
         Ok(())
     }
 
+    /// `c tautilde^2 / eps`: the energy per area or volume that weighs as much as `1/2 (V[u] - u)^2`. A step weighs
+    /// this by `tau m / (c tautilde^2)`, and energies by `tau m / eps`.
+    pub fn energy_unit(&self) -> f64 {
+        self.calibration.energy * self.mcf_step * self.mcf_step / self.eps
+    }
+
     /// `tau m / (c tautilde^2)`, the weight of the curvature against the motion in a time step of size `tau`.
     pub fn stiffness(&self, tau: f64) -> f64 {
         tau / (self.calibration.speed() * self.mcf_step * self.mcf_step)

@@ -7,7 +7,8 @@ use geometry::{Field, Grid, NodeSet, Nodes, PhaseField, Stored, require};
 use operators::ComputeDevice;
 
 use crate::{
-    DeviceField, Error, FlowParams, Held, Helfrich, HelfrichTerms, MeanCurvatureStep, State, bricks,
+    DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held, MeanCurvatureStep,
+    State, bricks,
 };
 
 /// A flow of phase fields: the step of mean curvature flow inside, the energy, and what may move.
@@ -20,7 +21,7 @@ pub struct Problem<const D: usize> {
     /// The step of mean curvature flow, of size `params.mcf_step`, on the whole grid.
     pub operator: Arc<dyn MeanCurvatureStep<D>>,
     /// What the energy has besides bending.
-    pub energy: Helfrich,
+    pub terms: EnergyTerms<D>,
     /// The motion of the step over that of the calibration (1 for an exact one; [`model::Calibration::response`]).
     pub response: f64,
     /// The nodes whose values move, if not all; see [`Self::restrict_to`].
@@ -62,7 +63,7 @@ impl<const D: usize> Problem<D> {
             grid: *grid,
             params,
             operator,
-            energy: Helfrich::default(),
+            terms: Vec::new(),
             response: 1.0,
             region: None,
             held: Held::default(),
@@ -154,17 +155,17 @@ impl<const D: usize> Problem<D> {
         Ok(())
     }
 
-    /// Makes this the energy, by a step of mean curvature flow with this [response](Self::response). The Willmore energies of the records are
-    /// then this energy.
+    /// Makes bending and these terms the energy, by a step of mean curvature flow with this [response](Self::response). The Willmore energies of the
+    /// records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for values that are not finite.
-    pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
-        energy.check()?;
-        (self.energy, self.response) = (energy, response);
+    /// [`Error::Geometry`] unless the response is positive.
+    pub fn set_energy(&mut self, terms: EnergyTerms<D>, response: f64) -> Result<(), Error> {
+        self.response = geometry::positive("response", response)?;
+        self.terms.clone_from(&terms);
         if let Some(half) = self.half.take() {
             let mut half = Arc::unwrap_or_clone(half);
-            half.set_energy(energy, response)?;
+            half.set_energy(terms, response)?;
             self.half = Some(Arc::new(half));
         }
         Ok(())
@@ -193,7 +194,7 @@ impl<const D: usize> Problem<D> {
                 other.to_bits() == own.to_bits()
             })?;
         }
-        half.set_energy(self.energy, self.response)?;
+        half.set_energy(self.terms.clone(), self.response)?;
         self.half = Some(Arc::new(half));
         let nodes = self.region.clone();
         nodes.map_or(Ok(()), |nodes| self.restrict_half(&nodes))
@@ -261,14 +262,14 @@ impl<const D: usize> Problem<D> {
         }
     }
 
-    /// What the energy has besides bending, where values are stored.
-    pub(crate) fn terms_on(&self, nodes: &Nodes<D>) -> Result<Option<HelfrichTerms<D>>, Error> {
-        if self.energy.is_willmore() {
-            return Ok(None);
-        }
-        let (grid, device) = (&self.grid, &self.device);
-        let terms = HelfrichTerms::new(self.energy, self.response, &self.params, grid, device)?;
-        Ok(Some(terms.on(nodes, self.rests(nodes), device)))
+    /// Where values are stored, as the terms of the energy see it.
+    pub fn domain(&self, nodes: &Nodes<D>) -> Domain<D> {
+        let scales = DomainScales {
+            eps: self.params.eps,
+            inner_step: self.params.mcf_step,
+            response: self.response,
+        };
+        Domain::new(nodes.clone(), self.rests(nodes), scales, &self.device)
     }
 
     /// The scaled energy counts points; this makes it the paper's, with true L2 norms: `2 eps h^D`, over the factor of the metric.

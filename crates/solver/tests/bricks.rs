@@ -3,20 +3,22 @@
 use std::sync::Arc;
 
 use crate::common::flow::Flow;
-use crate::common::{accurate, device, distance, dot, network, noise, params, passes_taylor_tests};
+use crate::common::{
+    accurate, device, distance, dot, network, noise, params, passes_taylor_tests, scales,
+};
 use geometry::distance::SignedDistanceExt;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Cross};
-use geometry::{Bricks, Field, Grid, NodeSet, SignedDistance, phase_field};
+use geometry::{Bricks, Field, Grid, NodeSet, Nodes, SignedDistance, phase_field};
 use linearize::taylor::halvings;
 use model::{Network, SeparableOperator};
 use solver::{
-    Constraints, Error, FlowParams, Helfrich, MinimizingMovement, NewtonParams, Objective,
-    Precision, StartKind,
+    Constraints, Domain, Error, FlowParams, Helfrich, MinimizingMovement, MovementGraph,
+    NewtonParams, Objective, Precision, StartKind,
 };
 
 /// Scales with a solver so accurate that only the storage makes a difference.
-fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
+pub fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams {
         calibration: accurate(D).calibration().unwrap().factors,
         newton: NewtonParams {
@@ -30,7 +32,7 @@ fn exact<const D: usize>(grid: &Grid<D>) -> FlowParams {
 }
 
 /// As accurate as steps are in which sizes are held.
-fn holding<const D: usize>(grid: &Grid<D>) -> FlowParams {
+pub fn holding<const D: usize>(grid: &Grid<D>) -> FlowParams {
     let exact = exact(grid);
     let newton = NewtonParams {
         tolerance: 1e-5,
@@ -39,18 +41,18 @@ fn holding<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams { newton, ..exact }
 }
 
-fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
+pub fn usual<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams {
         newton: NewtonParams::default(),
         ..exact(grid)
     }
 }
 
-fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
+pub fn dense<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
     Flow::with_network(&accurate(D), start, params, &device()).unwrap()
 }
 
-fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
+pub fn bricks<const D: usize>(start: &Field<D>, params: FlowParams) -> Flow<D> {
     Flow::on_bricks(&accurate(D), start, params, &device()).unwrap()
 }
 
@@ -62,7 +64,7 @@ fn difference<const D: usize>(start: &Field<D>, params: FlowParams, steps: &[f64
     )
 }
 
-fn difference_of<const D: usize>(
+pub fn difference_of<const D: usize>(
     (whole, few): (&mut Flow<D>, &mut Flow<D>),
     steps: &[f64],
 ) -> (f64, f64) {
@@ -82,12 +84,12 @@ fn field<const D: usize>(grid: Grid<D>, shape: &impl SignedDistance<D>) -> Field
     phase_field(grid, shape, 2.0 * grid.spacing()).unwrap()
 }
 
-fn cross() -> Field<2> {
+pub fn cross() -> Field<2> {
     let grid = Grid::per_unit(128, 2.0).unwrap();
     field(grid, &Cross::new(0.8, 0.27).unwrap())
 }
 
-fn dented() -> Field<3> {
+pub fn dented() -> Field<3> {
     let dented = |x: [f64; 3]| {
         let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let [a, b, c] = x.map(|x| x / r.max(1e-9));
@@ -105,9 +107,18 @@ fn derivatives<const D: usize>(cells: usize) {
     let bricks = Bricks::new(cells, side, |place| !hole(place), |place| place[0] == 0).unwrap();
     let shape = bricks.shape();
     let step = Arc::new(operator.on(&bricks, &device));
-    let mut energy =
-        MinimizingMovement::with_terms(step, shape, Precision::Device, (false, None), &device)
-            .unwrap();
+    let grid = Grid::new(cells, 1.0).unwrap();
+    let nodes = Nodes::on_bricks(grid, Arc::new(bricks.clone()));
+    let domain = Domain::new(nodes, operator.rests(), scales(&grid), &device);
+    let mut energy = MinimizingMovement::traced(MovementGraph {
+        step,
+        domain: &domain,
+        terms: &[],
+        unit: 1.0,
+        products: Precision::Device,
+        weighted: false,
+    })
+    .unwrap();
     let [u, anchor, p] = [1, 2, 3].map(|seed| noise(bricks.len(), seed));
     energy.set(&device.tensor(&anchor, shape), 40.0).unwrap();
     let at = |t: f64| -> Vec<f64> { u.iter().zip(&p).map(|(u, p)| u + t * p).collect() };
@@ -292,8 +303,9 @@ fn difference_with<const D: usize>(start: &Field<D>, helfrich: Helfrich) -> (f64
     let params = exact(start.grid());
     let response = accurate(D).calibration().unwrap().response();
     let mut flows = (dense(start, params), bricks(start, params));
-    flows.0.set_energy(helfrich, response).unwrap();
-    flows.1.set_energy(helfrich, response).unwrap();
+    let terms = || helfrich.terms().unwrap();
+    flows.0.set_energy(terms(), response).unwrap();
+    flows.1.set_energy(terms(), response).unwrap();
     difference_of((&mut flows.0, &mut flows.1), &[params.mcf_step / 4.0; 2])
 }
 

@@ -5,14 +5,19 @@ use std::sync::Arc;
 
 use crate::common::flow::Flow;
 use crate::common::{
-    ball, device, dot, network, network_3d, noise, params, passes_taylor_tests, ratios,
+    accurate, ball, device, dot, network, network_3d, noise, params, passes_taylor_tests, ratios,
+    scales, values,
 };
+use crate::domain::Both;
 use burn::tensor::Tensor;
 use geometry::zero_set::ball_perimeter;
 use geometry::{Field, Grid, ZeroSet};
 use linearize::taylor::halvings;
-use model::{MeanCurvatureOperator, Network, Shipped};
-use solver::{Error, Helfrich, HelfrichTerms, MinimizingMovement, Objective, Precision};
+use model::{MeanCurvatureOperator, Network, SeparableOperator, Shipped};
+use solver::{
+    Domain, Error, Helfrich, MeanCurvatureStep, MinimizingMovement, MovementGraph, Objective,
+    Precision,
+};
 
 const ALL: Helfrich = Helfrich {
     spontaneous_curvature: 3.0,
@@ -27,15 +32,15 @@ fn energy_with<const D: usize>(
 ) -> MinimizingMovement<D> {
     let device = device();
     let operator = MeanCurvatureOperator::new(network, &device).unwrap();
-    let terms = HelfrichTerms::new(helfrich, 1.0, &params(grid), grid, &device).unwrap();
-    let (shape, precision) = (grid.shape(), Precision::Device);
-    MinimizingMovement::with_terms(
-        Arc::new(operator),
-        shape,
-        precision,
-        (false, Some(&terms)),
-        &device,
-    )
+    let domain = Domain::new((*grid).into(), [-1.0, 1.0], scales(grid), &device);
+    MinimizingMovement::traced(MovementGraph {
+        step: Arc::new(operator),
+        domain: &domain,
+        terms: &helfrich.terms().unwrap(),
+        unit: params(grid).energy_unit(),
+        products: Precision::Device,
+        weighted: false,
+    })
     .unwrap()
 }
 
@@ -77,6 +82,80 @@ fn derivatives<const D: usize>(network: &Network, cells: usize) {
 fn derivatives_pass_taylor_tests() {
     derivatives::<2>(&network(), 32);
     derivatives::<3>(&network_3d(), 20);
+}
+
+/// `1/2 |V[u] - u + g tautilde c0 q'|^2 + unit (sigma A + p V) / h^D` by loops, from the field on the grid and the residuals at
+/// the nodes that are stored.
+fn by_formula<const D: usize>(
+    u: &[f64],
+    residuals: &[f64],
+    domain: &Domain<D>,
+    helfrich: Helfrich,
+) -> f64 {
+    let (grid, h) = (domain.grid(), domain.spacing());
+    let (eps, tautilde) = (domain.eps(), domain.inner_step());
+    let (nodes, mut sum) = (domain.nodes(), 0.0);
+    let unit = params(grid).energy_unit();
+    let mut double_well = 0.0;
+    let mut volume = domain.unstored()[1] as f64;
+    for (node, residual) in residuals.iter().enumerate() {
+        let u = u[grid.index(nodes.place(node))];
+        let slope = 0.75 / eps * (1.0 - u * u);
+        let shift = domain.response() * tautilde * helfrich.spontaneous_curvature * slope;
+        sum += 0.5 * (residual + shift).powi(2);
+        double_well += 9.0 / 16.0 * (1.0 - u * u).powi(2);
+        volume += 0.25 * (2.0 + 3.0 * u - u.powi(3));
+    }
+    let weights = [8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0];
+    let mut dirichlet = 0.0;
+    for node in 0..grid.len() {
+        let beside = |axis: usize, steps: usize| {
+            let mut place = grid.multi_index(node);
+            place[axis] += steps;
+            u[grid.index(place)]
+        };
+        for axis in 0..D {
+            for (k, weight) in weights.iter().enumerate() {
+                // -sum u d u = sum w_k (u_(i+k) - u_i)^2
+                dirichlet += weight * (beside(axis, k + 1) - u[node]).powi(2) / (h * h);
+            }
+        }
+    }
+    let perimeter = 0.5 * (eps * dirichlet + double_well / eps);
+    sum + unit * (helfrich.tension * perimeter + helfrich.pressure * volume)
+}
+
+fn is_the_formula<const D: usize>(cells: usize, bound: f64) {
+    let (device, both, network) = (device(), Both::<D>::wide(cells), accurate(D));
+    let on_grid = values(&both.on_grid);
+    let check = |step: Arc<dyn MeanCurvatureStep<D>>, domain: &Domain<D>, u: &Tensor<D>| {
+        let residuals = values(&(step.apply(u.clone()) - u.clone()));
+        let graph = MovementGraph {
+            step,
+            domain,
+            terms: &ALL.terms().unwrap(),
+            unit: params(domain.grid()).energy_unit(),
+            products: Precision::Device,
+            weighted: false,
+        };
+        let mut energy = MinimizingMovement::traced(graph).unwrap();
+        energy.set(u, 1.0).unwrap();
+        let found = energy.value(u).unwrap();
+        let expected = by_formula(&on_grid, &residuals, domain, ALL);
+        let error = (found / expected - 1.0).abs();
+        assert!(error < bound, "{D}: {found} {expected} {error:e}");
+    };
+    let step = MeanCurvatureOperator::new(&network, &device).unwrap();
+    check(Arc::new(step), &both.whole, &both.on_grid);
+    let operator = SeparableOperator::new(&network, &device).unwrap();
+    let step = operator.on(&both.bricks, &device);
+    check(Arc::new(step), &both.few, &both.on_bricks);
+}
+
+#[test]
+fn energies_are_those_of_the_formulas() {
+    is_the_formula::<2>(128, 1e-12);
+    is_the_formula::<3>(64, 1e-4);
 }
 
 /// `A` and `V` of a ball, and their derivatives by its radius.
@@ -142,7 +221,8 @@ fn flow_by<const D: usize>(recipe: Shipped, u: &Field<D>, helfrich: Helfrich) ->
     params.calibration = calibration.factors;
     let network = network.odd_part();
     let mut flow = Flow::with_network(&network, u, params, &device()).unwrap();
-    flow.set_energy(helfrich, calibration.response()).unwrap();
+    let terms = helfrich.terms().unwrap();
+    flow.set_energy(terms, calibration.response()).unwrap();
     flow
 }
 
@@ -303,7 +383,12 @@ fn what_is_not_finite_is_refused() {
     let u = ball(Grid::<2>::per_unit(64, 1.0).unwrap(), 0.2);
     let mut flow = flow(&u, Helfrich::default());
     for value in [f64::NAN, f64::INFINITY] {
-        let error = flow.set_energy(bent(value), 1.0).unwrap_err();
-        assert!(matches!(error, Error::Geometry(_)), "{error}");
+        let errors = [
+            bent(value).terms::<2>().err().unwrap(),
+            flow.set_energy(Vec::new(), value).unwrap_err(),
+        ];
+        for error in errors {
+            assert!(matches!(error, Error::Geometry(_)), "{error}");
+        }
     }
 }

@@ -10,13 +10,13 @@ use solver::{Error, FlowParams, StartKind, StepRecord};
 
 const EPS: f64 = 1.0 / 64.0;
 /// Both time steps.
-const TAU: f64 = 1.0 / 16384.0;
+pub const TAU: f64 = 1.0 / 16384.0;
 
-fn grid() -> Grid<2> {
+pub fn grid() -> Grid<2> {
     Grid::per_unit(256, 0.75).unwrap()
 }
 
-fn scales(network: &Network) -> FlowParams {
+pub fn scales(network: &Network) -> FlowParams {
     FlowParams {
         calibration: network.calibration().unwrap().factors,
         ..FlowParams::paper(EPS, TAU)
@@ -28,15 +28,15 @@ fn ratios(n: usize, width: usize) -> Ratios {
     FlowParams::paper(EPS, TAU).ratios(&grid, width)
 }
 
-fn accurate(n: usize, width: usize) -> Network {
+pub fn accurate(n: usize, width: usize) -> Network {
     Shipped::Accurate.find(ratios(n, width)).unwrap()
 }
 
-fn cross() -> Field<2> {
+pub fn cross() -> Field<2> {
     phase_field(grid(), &Cross::new(0.27, 0.1).unwrap(), EPS).unwrap()
 }
 
-fn flow(half: bool) -> Flow<2> {
+pub fn flow(half: bool) -> Flow<2> {
     let network = accurate(256, 33);
     let mut flow = Flow::with_network(&network, &cross(), scales(&network), &device()).unwrap();
     if half {

@@ -3,7 +3,7 @@ use geometry::{Field, NodeSet, PhaseField, Stored};
 use model::Network;
 use operators::ComputeDevice;
 use solver::{
-    Candidate, Error, Euler, FlowParams, Held, Helfrich, LearnedStep, MeanCurvature,
+    Candidate, EnergyTerms, Error, Euler, FlowParams, Held, LearnedStep, MeanCurvature,
     MeanCurvatureStep, Problem, Scheme, SecondOrder, State, StepRecord, StepSize,
 };
 
@@ -116,8 +116,8 @@ impl<const D: usize> Flow<D> {
         self.problem.hold(held)
     }
 
-    pub fn set_energy(&mut self, energy: Helfrich, response: f64) -> Result<(), Error> {
-        self.problem.set_energy(energy, response)
+    pub fn set_energy(&mut self, terms: EnergyTerms<D>, response: f64) -> Result<(), Error> {
+        self.problem.set_energy(terms, response)
     }
 
     pub fn begin_on(&mut self, half: Self) -> Result<(), Error> {

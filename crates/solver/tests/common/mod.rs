@@ -6,7 +6,7 @@ use geometry::{Field, Grid, phase_field, shapes::Ball};
 use model::training::levenberg_marquardt::heat_kernel;
 use model::{Network, Ratios, Shipped};
 use operators::ComputeDevice;
-use solver::{Error, FlowParams, Objective};
+use solver::{DomainScales, Error, FlowParams, Objective};
 
 pub fn device() -> ComputeDevice {
     ComputeDevice::default_compiled().unwrap()
@@ -37,6 +37,16 @@ pub fn network_3d() -> Network {
 /// The scales that fit the networks here.
 pub fn params<const D: usize>(grid: &Grid<D>) -> FlowParams {
     FlowParams::paper(2.0 * grid.spacing(), grid.spacing().powi(2))
+}
+
+/// The same for formulas, with an exact step of mean curvature flow.
+pub fn scales<const D: usize>(grid: &Grid<D>) -> DomainScales {
+    let FlowParams { eps, mcf_step, .. } = params(grid);
+    DomainScales {
+        eps,
+        inner_step: mcf_step,
+        response: 1.0,
+    }
 }
 
 pub fn ball<const D: usize>(grid: Grid<D>, radius: f64) -> Field<D> {
