@@ -1,9 +1,7 @@
 #![allow(missing_docs, reason = "messages and names say it")]
 
+use mean_curvature::StepFailure;
 use thiserror::Error as ThisError;
-
-/// Why a step of mean curvature flow failed.
-pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
 
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use burn::tensor::Tensor;
 use geometry::{Field, Grid, NodeSet, PhaseField, Stored};
+use mean_curvature::{PhaseInverse, PhaseInverses};
 use model::{MeanCurvatureOperator, Network, SeparableOperator};
 use operators::{ComputeDevice, inner_product};
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::active::Active;
 use crate::constraints::{Constraints, Held};
 use crate::newton::{NewtonInfo, minimize_timed};
-use crate::preconditioner::{PhaseInverse, Preconditioner};
+use crate::preconditioner::Preconditioner;
 use crate::region::Region;
 use crate::stored::tensor;
 use crate::times::PhaseTimes;
@@ -115,6 +116,8 @@ pub struct WillmoreFlow<const D: usize> {
     energies: [Option<MinimizingMovement<D>>; 2],
     /// What it has besides bending.
     terms: Option<HelfrichTerms<D>>,
+    /// The inverses in the pure phases, and the one that is used.
+    phases: Option<PhaseInverses<D>>,
     phase: Option<(f64, PhaseInverse<D>)>,
     region: Option<Region<D>>,
     constraints: Constraints,
@@ -212,6 +215,7 @@ impl<const D: usize> WillmoreFlow<D> {
             mcf,
             energies: [None, None],
             terms: None,
+            phases: None,
             phase: None,
             region: None,
             constraints: Constraints::default(),
@@ -247,7 +251,7 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// Makes this the energy of all following steps, by a step of mean curvature flow whose motion is `response` times that of the calibration
-    /// (1 for an exact one; [`model::Calibration::response`]). The Willmore energies of the records are then this energy.
+    /// (1 for an exact one; [`mean_curvature::Calibration::response`]). The Willmore energies of the records are then this energy.
     ///
     /// # Errors
     /// [`Error::Geometry`] for values that are not finite.
@@ -492,7 +496,7 @@ impl<const D: usize> WillmoreFlow<D> {
         } = *movement;
         let step = self.step + 1;
         let stiffness = self.params.stiffness(tau);
-        self.prepare(stiffness);
+        self.prepare(stiffness)?;
         let weighted = usize::from(factors.is_some());
         let energy = match self.energies[weighted].take() {
             Some(energy) => energy,
@@ -557,18 +561,26 @@ impl<const D: usize> WillmoreFlow<D> {
     }
 
     /// Fits preconditioner and accuracy to a weight of the curvature.
-    fn prepare(&mut self, stiffness: f64) {
+    fn prepare(&mut self, stiffness: f64) -> Result<(), Error> {
         let prepared = self.phase.as_ref().map(|(c, _)| c.to_bits());
         if prepared == Some(stiffness.to_bits()) {
-            return;
+            return Ok(());
         }
-        let phase = self.mcf.phase_preconditioner(self.grid.cells(), stiffness);
-        self.phase = Some((stiffness, phase));
+        let phases = match self.phases.take() {
+            Some(phases) => phases,
+            None => {
+                let inverses = self.mcf.phase_inverses(&self.nodes(), &self.device);
+                inverses.map_err(Error::Step)?
+            }
+        };
+        self.phase = Some((stiffness, phases(stiffness)));
+        self.phases = Some(phases);
         self.mcf.set_accuracy(&Accuracy {
             stiffness,
             tolerance: self.params.newton.tolerance,
             cg_tolerance: self.params.newton.cg_tolerance,
         });
+        Ok(())
     }
 }
 

@@ -56,7 +56,7 @@ impl Helfrich {
 
 /// The terms of [`Helfrich`] in phase fields, as the energy of a step has them.
 ///
-/// With the factor `c` and the response `g` of the step to curvature ([`model::Calibration`]), and `q' = 3/(4 eps) (1 - u^2)` for the slope of
+/// With the factor `c` and the response `g` of the step to curvature ([`mean_curvature::Calibration`]), and `q' = 3/(4 eps) (1 - u^2)` for the slope of
 /// the optimal profile, the residual becomes `V[u] - u + g tautilde c0 q'`, and
 ///
 /// `A = int eps/2 |grad u|^2 + Psi(u)/(2 eps)`, `Psi(u) = 9/16 (1 - u^2)^2`,    `V = int (2 + 3 u - u^3)/4`.

@@ -62,13 +62,14 @@ mod times;
 
 pub use constraints::Constraints;
 pub use displacement::widths_between;
-pub use energy::{Accuracy, MeanCurvatureStep, MinimizingMovement, Objective};
-pub use error::{Error, StepFailure};
+pub use energy::{MinimizingMovement, Objective};
+pub use error::Error;
 pub use flow::{FlowState, Start, StartKind, StepEstimates, StepRecord, WillmoreFlow};
 pub use helfrich::{Helfrich, HelfrichTerms};
-pub use model::Factors;
+pub use mean_curvature::{
+    Accuracy, Factors, MeanCurvatureStep, PhaseInverse, PhaseInverses, StepFailure,
+};
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
 pub use params::{FlowParams, Method, NewtonParams, Precision};
-pub use preconditioner::PhaseInverse;
 pub use times::PhaseTimes;

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use crate::common::{accurate, ball, device, network, params, ratios};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
-use model::{Calibration, Network, Shipped};
+use mean_curvature::Calibration;
+use model::{Network, Shipped};
 use solver::{Error, Factors, FlowParams, WillmoreFlow};
 
 /// A radius of the reference experiment, `2^-4 pi`.

@@ -6,6 +6,7 @@ mod common;
 mod constraints;
 mod flow;
 mod helfrich;
+mod measured;
 mod minimization;
 mod profile;
 mod region;

@@ -3,9 +3,9 @@ use crate::prelude::*;
 use crate::surfaces;
 use fem::FiniteElementStep;
 use geometry::shapes::Torus;
+use mean_curvature::{Calibration, Factors};
 use model::training::SphereData;
-use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use solver::Factors;
+use model::{NamedNetwork, Network, Shipped, displacement_errors};
 
 const RADII: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6];
 const QUICK_RADII: [f64; 2] = [0.15, 0.3];

@@ -82,7 +82,7 @@ impl<const D: usize> WillmoreFlow<D> {
         self.terms = self.terms.take().map(|terms| terms.on(&next, &self.device));
         self.active = Some(next);
         // What it was prepared for belongs to the step of mean curvature flow.
-        self.phase = None;
+        (self.phases, self.phase) = (None, None);
         self.energies = [None, None];
         Ok(())
     }

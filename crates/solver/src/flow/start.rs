@@ -2,7 +2,8 @@
 
 use burn::tensor::{Slice, Tensor};
 use geometry::{Field, Grid, NodeSet, require};
-use model::{Factors, Network, Ratios, Shipped};
+use mean_curvature::{Coarser, MeanCurvatureStep};
+use model::{MeanCurvatureOperator, Network};
 use operators::extrapolate;
 use serde::{Deserialize, Serialize};
 
@@ -81,35 +82,23 @@ impl<const D: usize> WillmoreFlow<D> {
     /// profiles of one recipe are alike on all grids. Says how many grids there are below this one; none for an odd number of cells,
     /// without networks, or on active bricks.
     pub fn begin_on_half_grids(&mut self, network: &Network) -> Result<usize, Error> {
-        /// Below this many cells per `eps` the motion is too far off to be of use.
-        const COARSEST: f64 = 2.0;
-        let ratios = halved(network.ratios()).filter(|r| r.eps_over_h >= COARSEST);
-        let (Some(ratios), Ok(grid), None) = (ratios, self.grid.half(), &self.active) else {
+        let operator = MeanCurvatureOperator::new(network, &self.device)?;
+        self.begin_on_coarser_steps(&operator)
+    }
+
+    fn begin_on_coarser_steps(&mut self, step: &dyn MeanCurvatureStep<D>) -> Result<usize, Error> {
+        let (Ok(grid), None) = (self.grid.half(), &self.active) else {
             return Ok(0);
         };
-        let papers_energy = self.params.calibration == Factors::PAPER;
-        let papers_recipe = papers_energy
-            || Shipped::Paper
-                .find(network.ratios())
-                .is_ok_and(|n| n.kernel() == network.kernel());
-        let shipped = if papers_recipe {
-            Shipped::Paper
-        } else {
-            Shipped::Accurate
-        };
-        let Ok(mut network) = shipped.find(ratios) else {
+        let coarser = step.coarser(self.params.calibration);
+        let Some(Coarser { step, factors }) = coarser.map_err(Error::Step)? else {
             return Ok(0);
         };
         let mut params = self.params;
-        if !papers_energy {
-            params.calibration = network.calibration()?.factors;
-            if papers_recipe {
-                network = network.odd_part();
-            }
-        }
-        let initial = Field::constant(grid, 1.0);
-        let mut half = Self::with_network(&network, &initial, params, &self.device)?;
-        let levels = 1 + half.begin_on_half_grids(&network)?;
+        params.calibration = factors;
+        let start = Tensor::ones(grid.shape(), (self.device.device(), self.device.dtype()));
+        let mut half = Self::begun(step.clone(), None, (&grid, start), params, &self.device);
+        let levels = 1 + half.begin_on_coarser_steps(&*step)?;
         self.begin_on(half)?;
         Ok(levels)
     }
@@ -204,15 +193,4 @@ fn every_other_node<const D: usize>(grid: Grid<D>, nodes: &NodeSet) -> NodeSet {
             .all(|index| index.is_multiple_of(2))
     });
     marks.map(|(_, mark)| mark).collect()
-}
-
-/// The ratios of a network for the half grid, with a kernel that reaches equally far.
-fn halved(ratios: Ratios) -> Option<Ratios> {
-    let reach = (ratios.width - 1) / 2;
-    reach.is_multiple_of(2).then_some(Ratios {
-        width: reach + 1,
-        eps_over_h: 0.5 * ratios.eps_over_h,
-        step_over_h2: 0.25 * ratios.step_over_h2,
-        ..ratios
-    })
 }
