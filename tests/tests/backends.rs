@@ -17,8 +17,8 @@ use operators::{
     inner_product, retract, spectral_filter, tabulated, update_on_host,
 };
 use solver::{
-    Exit, FlowParams, LearnedStep, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective,
-    Problem, State, StepRecord, Stepper,
+    Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, Problem,
+    State, StepRecord, Stepper,
 };
 use support::{
     Backend, backends, convolution, correlation, dot, noise, relative_distance, splitting_network,
@@ -803,7 +803,7 @@ fn learned<const D: usize>(
     params: FlowParams,
     device: &ComputeDevice,
 ) -> Problem<D> {
-    let step = LearnedStep::new(network, device).unwrap();
+    let step = MeanCurvatureOperator::new(network, device).unwrap();
     Problem::new(step, grid, params, device).unwrap()
 }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use derive_more::Display;
 use fem::{FiniteElementStep, LinearSolver};
 use geometry::Grid;
-use model::{Calibration, NamedNetwork, NeededNetwork, Networks, Shipped};
+use mean_curvature::{Calibration, Factors, MeanCurvatureStep};
+use model::{NamedNetwork, NeededNetwork, Networks, Shipped};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use solver::{Factors, MeanCurvatureStep, NewtonParams};
+use solver::NewtonParams;
 
 use crate::{Error, Flow, Storage};
 
@@ -165,7 +166,7 @@ pub struct Operator<const D: usize> {
     pub scheme: Scheme,
     /// The calibration factors by which the terms of the energy are divided.
     pub factors: Factors,
-    /// The response of the step to curvature ([`model::Calibration::response`]); 1 in the paper's scheme.
+    /// The response of the step to curvature ([`mean_curvature::Calibration::response`]); 1 in the paper's scheme.
     pub response: f64,
     /// How the linear systems of implicit finite elements are solved.
     pub linear: LinearSolver,

@@ -1,10 +1,13 @@
 //! The problem of a case, its scheme, and where it starts.
 
 use std::any::Any;
+use std::sync::Arc;
 
 use fem::FiniteElementStep;
+use mean_curvature::MeanCurvatureStep;
+use model::MeanCurvatureOperator;
 use operators::ComputeDevice;
-use solver::{Euler, LearnedStep, MeanCurvature, Problem, Scheme, SecondOrder, State};
+use solver::{Euler, MeanCurvatureFlow, Problem, Scheme, SecondOrder, State};
 
 use crate::{Case, Error, Flow, Method, Order, Storage};
 
@@ -31,7 +34,7 @@ pub(crate) fn of<const D: usize>(
 ) -> Result<Parts<D>, Error> {
     let (kind, grid, storage) = (device.kind(), case.grid(), case.operator.storage);
     let needs_grid = match (case.flow, case.operator.method) {
-        (Flow::Willmore, Method::Hybrid) => None,
+        (Flow::Willmore, Method::Hybrid | Method::Own) => None,
         (Flow::MeanCurvature, _) => Some("mean curvature flows"),
         (Flow::Willmore, _) => Some("finite elements"),
     };
@@ -56,26 +59,24 @@ pub(crate) fn of<const D: usize>(
 
 fn make<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<Parts<D>, Error> {
     let (params, operator, grid) = (case.params(), &case.operator, case.grid());
-    let elements = match operator.network() {
-        Some(_) => None,
-        None => Some(operator.elements(grid, &case.scales)?),
+    let mut elements = None;
+    let step: Arc<dyn MeanCurvatureStep<D>> = match (operator.own_step(), operator.network()) {
+        (Some(own), _) => own.clone(),
+        (None, Some(named)) => Arc::new(MeanCurvatureOperator::new(&named.network, device)?),
+        (None, None) => Arc::new(
+            elements
+                .insert(operator.elements(grid, &case.scales)?)
+                .clone(),
+        ),
     };
-    let mut problem = match (elements.clone(), operator.network()) {
-        (Some(step), _) => Problem::new(step, grid, params, device)?,
-        (None, Some(named)) => {
-            let network = &named.network;
-            network.check_fits(params.ratios(grid, network.ratios().width))?;
-            Problem::new(LearnedStep::new(network, device)?, grid, params, device)?
-        }
-        (None, None) => unreachable!("a step without a network is one of finite elements"),
-    };
+    let mut problem = Problem::with(step, grid, params, device)?;
     let start = start(case, &problem)?;
     if case.flow == Flow::Willmore {
         willmore(case, &mut problem, &start)?;
     }
     let scheme: Box<dyn Scheme<D>> = match (&case.own.scheme, case.flow, case.steps.order) {
         (Some(make), ..) => make(),
-        (None, Flow::MeanCurvature, _) => Box::new(MeanCurvature),
+        (None, Flow::MeanCurvature, _) => Box::new(MeanCurvatureFlow),
         (None, Flow::Willmore, Order::First) => Box::new(Euler::new()),
         (None, Flow::Willmore, Order::Second | Order::Controlled(_)) => {
             Box::new(SecondOrder::new())
@@ -113,20 +114,13 @@ fn willmore<const D: usize>(
 
 /// The start of a case, of what is to be stored.
 fn start<const D: usize>(case: &Case<D>, problem: &Problem<D>) -> Result<State<D>, Error> {
-    use solver::Error::{Geometry, NeedsGrid, NoInterface};
+    use solver::Error::{Geometry, NoInterface, Operator};
     /// Bricks that are more than this part of the grid do not pay.
     const PAYS: f64 = 0.5;
-    let dense = || -> Result<_, Error> {
-        if let Some(named) = case.operator.network() {
-            let (width, cells) = (named.network.ratios().width, case.grid().cells());
-            if width > cells {
-                return Err(model::Error::KernelTooWide { width, cells }.into());
-            }
-        }
-        Ok(problem.start(&case.initial.field()?)?)
-    };
+    let dense = || -> Result<_, Error> { Ok(problem.start(&case.initial.field()?)?) };
     let bricks = || problem.start_on_bricks(&case.initial);
-    if case.flow == Flow::MeanCurvature || case.operator.network().is_none() {
+    let elements = [Method::FeImplicit, Method::FeSemi].contains(&case.operator.method);
+    if case.flow == Flow::MeanCurvature || elements {
         return dense();
     }
     Ok(match case.operator.storage {
@@ -136,8 +130,7 @@ fn start<const D: usize>(case: &Case<D>, problem: &Problem<D>) -> Result<State<D
             Ok(state) if (state.field.nodes().len() as f64) < PAYS * case.grid().len() as f64 => {
                 state
             }
-            Ok(_)
-            | Err(NeedsGrid { .. } | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
+            Ok(_) | Err(Operator(_) | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
                 // Bricks are no alternative.
                 let nodes = case.grid().len();
                 let needed = (nodes, case.bytes(nodes));

@@ -2,7 +2,7 @@
 //!
 //! The nested scheme of Franken, Rumpf and Wirth puts a finite-element step of mean curvature flow into the
 //! minimizing-movement energy; [`FiniteElementStep`] is that step, fully implicit or semi-implicit, and
-//! [`solver::Euler`] does the rest with the same Newton method as for the learned operator:
+//! `solver::Euler` does the rest with the same Newton method as for the learned operator:
 //!
 //! ```
 //! use fem::FiniteElementStep;

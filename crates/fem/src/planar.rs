@@ -7,8 +7,8 @@
 
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Col, Mat};
-use model::PlanarStep;
-use model::calibration::PlanarScales;
+use mean_curvature::PlanarStep;
+use mean_curvature::calibration::PlanarScales;
 
 use crate::element::gauss_points;
 use crate::scheme::Kind;
@@ -184,7 +184,7 @@ impl ElementsOnPlanes {
     }
 
     /// `v[u]`.
-    fn step(&self, u: &Col<f64>) -> Result<Col<f64>, model::Error> {
+    fn step(&self, u: &Col<f64>) -> Result<Col<f64>, mean_curvature::Error> {
         let r = self.reaction;
         let planes = u.nrows();
         let solve = |parts: &[Part], right: &Col<f64>| {
@@ -212,7 +212,7 @@ impl ElementsOnPlanes {
             }
         }
         let reason = "the implicit step does not converge";
-        Err(model::Error::uncalibrated(reason))
+        Err(mean_curvature::Error::uncalibrated(reason))
     }
 }
 
@@ -229,7 +229,7 @@ impl PlanarStep for ElementsOnPlanes {
         self.scales
     }
 
-    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), model::Error> {
+    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), mean_curvature::Error> {
         let planes = w.nrows();
         let v = self.step(w)?;
         let factors = self.right(w);

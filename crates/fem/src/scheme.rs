@@ -127,6 +127,11 @@ impl<const D: usize> Scheme<D> {
         (mass, derivative)
     }
 
+    /// How linear systems are solved.
+    pub fn solver(&self) -> LinearSolver {
+        self.solver
+    }
+
     /// Sets how accurately the inner systems are solved.
     pub fn set_tolerances(&self, tolerances: Tolerances) {
         *lock(&self.tolerances) = tolerances;

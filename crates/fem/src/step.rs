@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
-use geometry::{Field, Grid};
+use geometry::{Field, Grid, Nodes};
 use linearize::Extensions;
-use model::Calibration;
-use operators::{SpectralFilter, spectral_filter};
-use solver::{Accuracy, MeanCurvatureStep, PhaseInverse};
+use mean_curvature::{
+    Accuracy, Calibration, Identity, MeanCurvatureStep, PhaseInverse, PhaseInverses, StepFailure,
+    StepScales,
+};
+use operators::{ComputeDevice, SpectralFilter, spectral_filter};
+use serde_json::json;
 
 use crate::ops::{FemOps, Operation, register};
 use crate::planar::ElementsOnPlanes;
@@ -155,12 +158,12 @@ impl<const D: usize> FiniteElementStep<D> {
     /// What the step makes of the Willmore energy, from its flat interfaces (`docs/calibration.md`).
     ///
     /// # Errors
-    /// [`model::Error::Calibration`] if the step has no flat interface at rest.
-    pub fn calibrate(&self) -> Result<Calibration, model::Error> {
+    /// [`mean_curvature::Error::Calibration`] if the step has no flat interface at rest.
+    pub fn calibrate(&self) -> Result<Calibration, mean_curvature::Error> {
         let h = self.grid.spacing();
         let (eps, step) = (self.eps / h, self.step / (h * h));
         let on_planes = |normal: &[isize]| ElementsOnPlanes::new(self.kind, eps, step, normal);
-        model::calibrate(model::normals(D), on_planes)
+        mean_curvature::calibrate(mean_curvature::normals(D), on_planes)
     }
 
     /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit
@@ -208,12 +211,40 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         crate::extensions()
     }
 
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
-        let inverse = SpectralFilter::from_symbol(&[cells; D], |theta| {
-            let (mass, derivative) = self.scheme.phase_symbols(self.kind, theta);
-            1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
-        });
-        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
+    fn identity(&self) -> Identity {
+        let name = match self.kind {
+            Kind::Implicit => "implicit finite elements",
+            Kind::SemiImplicit => "semi-implicit finite elements",
+        };
+        let solver = format!("{:?}", self.scheme.solver());
+        Identity::new(
+            name,
+            json!({ "eps": self.eps, "step": self.step, "solver": solver }),
+        )
+    }
+
+    fn phase_inverses(
+        &self,
+        _nodes: &Nodes<D>,
+        _device: &ComputeDevice,
+    ) -> Result<PhaseInverses<D>, StepFailure> {
+        let (step, shape) = (self.clone(), self.grid.shape());
+        Ok(Arc::new(move |stiffness| {
+            let inverse = SpectralFilter::from_symbol(&shape, |theta| {
+                let (mass, derivative) = step.scheme.phase_symbols(step.kind, theta);
+                1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
+            });
+            Arc::new(move |r: &Tensor<D>| spectral_filter(r.clone(), &inverse)) as PhaseInverse<D>
+        }))
+    }
+
+    /// From the element matrices on planes, exactly.
+    fn calibrate(
+        &self,
+        _scales: &StepScales,
+        _device: &ComputeDevice,
+    ) -> Result<Calibration, StepFailure> {
+        Ok(FiniteElementStep::calibrate(self)?)
     }
 
     /// A product with the Hessian contains `c (J - 1)^T M (J - 1) p`; where `J` is near 1, errors of `J p` come out `c` times
@@ -227,9 +258,9 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         });
     }
 
-    fn failure(&self) -> Option<solver::StepFailure> {
+    fn failure(&self) -> Option<StepFailure> {
         self.scheme
             .take_failure()
-            .map(|error| Box::new(error) as solver::StepFailure)
+            .map(|error| Box::new(error) as StepFailure)
     }
 }

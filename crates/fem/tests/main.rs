@@ -1,4 +1,5 @@
 //! Steps and the nested scheme.
 
+mod measured;
 mod nested;
 mod steps;

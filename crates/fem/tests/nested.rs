@@ -13,7 +13,7 @@ use linearize::taylor::{halvings, remainder};
 use operators::ComputeDevice;
 use rand::{RngExt, SeedableRng};
 use solver::{
-    Error, Exit, FlowParams, MeanCurvature, MeanCurvatureStep, MinimizingMovement, Objective,
+    Error, Exit, FlowParams, MeanCurvatureFlow, MeanCurvatureStep, MinimizingMovement, Objective,
     Problem, Scheme, StepSize, Stepper,
 };
 
@@ -230,7 +230,7 @@ fn a_ball_stays_put_and_discs_shrink() {
             moved / grid.spacing()
         );
         let Stepper { problem, state, .. } = flow_of(step, &start, params);
-        let mut flow = Stepper::by(MeanCurvature, problem, state);
+        let mut flow = Stepper::by(MeanCurvatureFlow, problem, state);
         for _ in 0..4 {
             flow.step(size).unwrap();
         }
@@ -252,7 +252,7 @@ fn a_failing_inner_solver_stops_the_flow_with_its_numbers() {
     let start = ball(grid, 0.3, eps).map(|u| 1e150 * u);
     let params = FlowParams::paper(eps, size);
     let Stepper { problem, state, .. } = flow_of(step.clone(), &start, params);
-    let error = MeanCurvature.step(&problem, &state, StepSize::whole(size));
+    let error = MeanCurvatureFlow.step(&problem, &state, StepSize::whole(size));
     let error = error.unwrap_err();
     assert!(matches!(error, Error::Step(_)), "{error}");
     assert!(error.to_string().contains("Newton's method"), "{error}");

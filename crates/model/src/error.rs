@@ -68,18 +68,12 @@ pub enum Error {
         iteration: usize,
         what: &'static str,
     },
-    #[error(
-        "calibration: {reason} (eigenvalue near 1: {eigenvalue:.6}); train the network longer, or run without calibration"
-    )]
-    Calibration {
-        reason: &'static str,
-        /// The eigenvalue of the step's derivative at the flat interface that should be 1; NaN if there is no such interface.
-        eigenvalue: f64,
-    },
     #[error("training interrupted after iteration {iteration}; run again to resume")]
     Interrupted { iteration: usize },
     #[error(transparent)]
     File(#[from] files::Error),
+    #[error(transparent)]
+    MeanCurvature(#[from] mean_curvature::Error),
     #[error(transparent)]
     Operators(#[from] operators::Error),
 }
@@ -99,14 +93,6 @@ impl Error {
             expected: expected.to_string(),
             found: found.to_string(),
         })
-    }
-
-    /// The calibration of a step that has no flat interface.
-    pub fn uncalibrated(reason: &'static str) -> Self {
-        Self::Calibration {
-            reason,
-            eigenvalue: f64::NAN,
-        }
     }
 
     /// Refuses numbers that are not finite.

@@ -1,4 +1,5 @@
 //! The learned mean-curvature operator `V[u] = F(K * u)`: network, training, quality, calibration, storage.
+//! [`MeanCurvatureOperator`] is a [`mean_curvature::MeanCurvatureStep`].
 //!
 //! ```
 //! use geometry::{Grid, exact::mean_curvature_radius, measure::l2_distance, phase_field, shapes::Ball};
@@ -35,13 +36,13 @@
 //!
 //! [`training::adam`] is the paper's method; [`training::levenberg_marquardt`] minimizes the same loss
 //! to its floor in about half a minute. The smallest spheres dominate that loss, so it says little without
-//! its radii: [`Quality`] measures it on two fixed sets. Inside the Willmore scheme a small loss is not enough: see [`calibration`].
+//! its radii: [`Quality`] measures it on two fixed sets. Inside the Willmore scheme a small loss is not enough: see [`mean_curvature::calibration`].
 //!
 //! Errors of the device and of the crates below pass through as they are.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
-pub mod calibration;
+mod calibration;
 mod error;
 mod mlp;
 mod network;
@@ -54,7 +55,6 @@ mod separable;
 mod store;
 pub mod training;
 
-pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
 pub use error::Error;
 pub use mlp::{Mlp, PAPER_LAYERS, forward, parameter_count};
 pub use network::{Network, Provenance};

@@ -1,11 +1,12 @@
 //! A trained operator: kernel, activation, and the ratios it was trained for.
 
 use files::{Sha256, hexadecimal};
+use mean_curvature::Calibration;
 use operators::{HermiteTable, TableRange};
 use serde::{Deserialize, Serialize};
 
 use crate::mlp::TABLE;
-use crate::{Calibration, Error, Mlp, Ratios};
+use crate::{Error, Mlp, Ratios};
 
 impl Ratios {
     /// Checks that the numbers can describe an operator.

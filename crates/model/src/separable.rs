@@ -1,12 +1,19 @@
 //! The operator on active bricks, for kernels that are products of functions of one variable.
 
+use std::sync::Arc;
+
 use burn::tensor::Tensor;
-use geometry::Bricks;
+use geometry::{Bricks, Nodes};
+use mean_curvature::{
+    Calibration, Error as StepError, Identity, MeanCurvatureStep, PhaseInverse, PhaseInverses,
+    StepFailure, StepScales,
+};
 use operators::{
     COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, add_scaled, brick_convolution,
     convolution_of_outside, tabulated,
 };
 
+use crate::operator::identity;
 use crate::{Error, Network};
 
 /// A kernel may differ from a product by this part of its largest value: networks of the accurate recipe, whose kernels are Gaussian, do
@@ -25,6 +32,8 @@ pub struct SeparableOperator<const D: usize> {
     range: TableRange,
     rests: [f64; 2],
     slope: f64,
+    network: Arc<Network>,
+    device: ComputeDevice,
 }
 
 impl<const D: usize> SeparableOperator<D> {
@@ -33,20 +42,34 @@ impl<const D: usize> SeparableOperator<D> {
     /// # Errors
     /// [`Error::NotSeparable`], [`Error::NoRest`], and as [`crate::MeanCurvatureOperator::new`].
     pub fn new(network: &Network, device: &ComputeDevice) -> Result<Self, Error> {
-        let ratios = network.ratios_in(D)?;
-        let taps = factor::<D>(network.kernel(), ratios.width)?;
+        network.ratios_in(D)?;
         let table = network.table()?;
+        let size = [table.range().cells, COEFFICIENTS];
+        let coefficients = device.tensor(table.coefficients(), size);
+        let network = Arc::new(network.clone());
+        Self::with_table(network, &table, &coefficients, device)
+    }
+
+    /// The same with the network's table, which is on the device already.
+    pub(crate) fn with_table(
+        network: Arc<Network>,
+        table: &HermiteTable,
+        coefficients: &Tensor<2>,
+        device: &ComputeDevice,
+    ) -> Result<Self, Error> {
+        let taps = factor::<D>(network.kernel(), network.ratios().width)?;
         let mass = taps.iter().sum::<f64>().powi(D as i32);
-        let [negative, positive] = [-1.0, 1.0].map(|phase| rest(&table, mass, phase));
+        let [negative, positive] = [-1.0, 1.0].map(|phase| rest(table, mass, phase));
         let rests = [negative?, positive?];
         let slope = rests.map(|rest| mass * table.derivative(mass * rest, 1));
-        let range = table.range();
         Ok(Self {
             taps,
-            table: device.tensor(table.coefficients(), [range.cells, COEFFICIENTS]),
-            range,
+            table: coefficients.clone(),
+            range: table.range(),
             rests,
             slope: 0.5 * (slope[0] + slope[1]),
+            network,
+            device: device.clone(),
         })
     }
 
@@ -141,6 +164,56 @@ impl<const D: usize> BrickOperator<D> {
             let smoothed = brick_convolution(r.clone(), taps, neighbours, false);
             add_scaled(identity, &smoothed, y)
         }
+    }
+}
+
+impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
+    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
+        BrickOperator::apply(self, u)
+    }
+
+    fn identity(&self) -> Identity {
+        identity(&self.operator.network)
+    }
+
+    fn allows_single_precision(&self) -> bool {
+        true
+    }
+
+    fn rests(&self) -> [f64; 2] {
+        self.operator.rests()
+    }
+
+    fn brick_side(&self) -> Option<usize> {
+        Some(self.operator.brick_side())
+    }
+
+    fn on(&self, nodes: &Nodes<D>) -> Result<Arc<dyn MeanCurvatureStep<D>>, StepFailure> {
+        let Some(bricks) = nodes.bricks() else {
+            let step = self.identity().name;
+            return Err(Box::new(StepError::BricksOnly { step }));
+        };
+        let operator = &self.operator;
+        Ok(Arc::new(operator.on(bricks, &operator.device)))
+    }
+
+    fn phase_inverses(
+        &self,
+        _nodes: &Nodes<D>,
+        _device: &ComputeDevice,
+    ) -> Result<PhaseInverses<D>, StepFailure> {
+        let step = self.clone();
+        Ok(Arc::new(move |stiffness| {
+            Arc::new(BrickOperator::phase_preconditioner(&step, stiffness)) as PhaseInverse<D>
+        }))
+    }
+
+    fn calibrate(
+        &self,
+        _scales: &StepScales,
+        _device: &ComputeDevice,
+    ) -> Result<Calibration, StepFailure> {
+        Ok(self.operator.network.calibration()?)
     }
 }
 

@@ -5,13 +5,14 @@ use std::path::Path;
 
 use files::write_atomically;
 use files::{Sha256, hexadecimal};
+use mean_curvature::Calibration;
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 
 use crate::mlp::{layout, parameter_count};
 use crate::network::Provenance;
-use crate::{Calibration, Error, Mlp, Network, Ratios};
+use crate::{Error, Mlp, Network, Ratios};
 
 /// Version of the file format, bumped when a reader of the old one would misread the new one.
 const FORMAT: &str = "1";

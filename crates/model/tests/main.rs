@@ -2,6 +2,7 @@
 
 mod calibration;
 mod fuzzing;
+mod measured;
 mod shipped_networks;
 
 #[global_allocator]

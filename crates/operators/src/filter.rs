@@ -65,6 +65,18 @@ impl SpectralFilter {
         Self::from_ordered(shape, double)
     }
 
+    /// The filter whose symbol has these values, in the order of a [`Transform`]'s spectra; even, as that of a real response.
+    ///
+    /// # Panics
+    /// Unless there is a value for each frequency.
+    pub fn from_spectrum(shape: &[usize], values: impl Iterator<Item = f64>) -> Self {
+        let transform = Transform::<f64>::of_shape(shape);
+        let points = transform.len() as f64;
+        let values: Vec<f64> = values.map(|value| value / points).collect();
+        assert_eq!(values.len(), transform.spectrum_len());
+        Self::from_ordered(shape, values)
+    }
+
     fn from_ordered(shape: &[usize], double: Vec<f64>) -> Self {
         let single = double.iter().map(|&v| v as f32).collect();
         Self(Arc::new(Symbol {

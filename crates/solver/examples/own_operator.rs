@@ -1,11 +1,11 @@
 //! Willmore flow with a step of mean curvature flow of one's own: an explicit step of the Allen-Cahn equation.
 
-use std::sync::Arc;
-
 use burn::tensor::Tensor;
 use geometry::{Grid, exact::willmore_radius, phase_field, shapes::Ball};
-use operators::{ComputeDevice, SpectralFilter, spectral_filter};
-use solver::{FlowParams, MeanCurvatureStep, PhaseInverse, Problem, Stepper};
+use mean_curvature::{Identity, MeanCurvatureStep};
+use operators::ComputeDevice;
+use serde_json::json;
+use solver::{FlowParams, Problem, Stepper};
 
 /// `v = u + tautilde (Laplace u + 2 a^2 (u - u^3))`, whose profile `tanh(a d)` is that of this project for `a = 3 / (4 eps)`.
 struct AllenCahn {
@@ -41,14 +41,9 @@ impl MeanCurvatureStep<2> for AllenCahn {
         linearize::Extensions::new()
     }
 
-    /// Where `u` is 1 or -1, the derivative of `v` is `1 + tautilde (Laplace - 4 a^2)`, diagonal in Fourier space.
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<2> {
-        let inverse = SpectralFilter::from_symbol(&[cells; 2], |angles| {
-            let laplacian: f64 = angles.iter().map(|k| 2.0 * (k.cos() - 1.0)).sum();
-            let change = self.step * (laplacian / self.spacing.powi(2) - 4.0 * self.a.powi(2));
-            1.0 / (1.0 + stiffness * change * change)
-        });
-        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
+    fn identity(&self) -> Identity {
+        let parameters = json!({ "spacing": self.spacing, "step": self.step, "a": self.a });
+        Identity::new("explicit Allen-Cahn", parameters)
     }
 }
 

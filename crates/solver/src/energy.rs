@@ -3,127 +3,18 @@
 use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor};
-use geometry::{Grid, Nodes};
+use geometry::Grid;
 use linearize::{Extensions, Graph, Inputs, Linearization, Value};
-use model::{BrickOperator, Factors, MeanCurvatureOperator};
-use operators::{ComputeDevice, spectral_filter};
+use mean_curvature::MeanCurvatureStep;
+use operators::ComputeDevice;
 
-use crate::error::StepFailure;
-use crate::{Domain, DomainScales, Error, PhaseInverse, Precision};
+use crate::{Domain, DomainScales, Error, Precision};
 
 mod helfrich;
 mod term;
 
 pub use helfrich::{Helfrich, Pressure, SpontaneousCurvature, Tension};
 pub use term::{EnergyTerm, EnergyTerms};
-
-/// A step of mean curvature flow, `v[u]`, as the energy sees it.
-///
-/// The solver asks no more of it: the learned operator is one, an implicit finite-element step can be another.
-pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
-    /// `v[u]` as a Burn graph, on whatever device `u` lives (including Burn's capture device).
-    fn apply(&self, u: Tensor<D>) -> Tensor<D>;
-
-    /// The matrix of the inner product in which the energy measures motions, as a Burn graph: `<a, b> = h^D a . mass(b)`.
-    /// The identity unless the step brings a mass matrix.
-    fn mass(&self, x: Tensor<D>) -> Tensor<D> {
-        x
-    }
-
-    /// Rules and handlers of the custom operations in that graph: by default of those of [`operators`].
-    fn extensions(&self) -> linearize::Extensions {
-        operators::extensions()
-    }
-
-    /// Whether Hessian-vector products may be computed in single precision.
-    fn allows_single_precision(&self) -> bool {
-        false
-    }
-
-    /// An approximate inverse of `1 + c (J - 1)^T (J - 1)` in the pure phases, `J` the derivative of `v`.
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D>;
-
-    /// Its name and parameters, which resuming compares.
-    fn identity(&self) -> crate::Identity {
-        crate::Identity::new("step", serde_json::json!(null))
-    }
-
-    /// The values near -1 and 1 that it keeps.
-    fn rests(&self) -> [f64; 2] {
-        [-1.0, 1.0]
-    }
-
-    /// The side of the bricks on which it can work, if it can.
-    fn brick_side(&self) -> Option<usize> {
-        None
-    }
-
-    /// The same step for values that are stored at these nodes.
-    fn on(&self, _nodes: &Nodes<D>) -> Result<Arc<dyn MeanCurvatureStep<D>>, StepFailure> {
-        Err("this step works on the whole grid only".into())
-    }
-
-    /// The same step on the grid of half as many cells, where minimizations may begin.
-    fn coarser(&self, _factors: Factors) -> Result<Option<Coarser<D>>, StepFailure> {
-        Ok(None)
-    }
-
-    /// Says how accurate derivatives of the step have to be; a step that solves systems adapts its tolerances.
-    fn set_accuracy(&self, _accuracy: &Accuracy) {}
-
-    /// The failure behind values that are not finite, if the step had one since the last call.
-    fn failure(&self) -> Option<StepFailure> {
-        None
-    }
-}
-
-/// A step on a coarser grid.
-pub struct Coarser<const D: usize> {
-    /// The step.
-    pub step: Arc<dyn MeanCurvatureStep<D>>,
-    /// Its calibration.
-    pub factors: Factors,
-}
-
-/// What the outer iteration asks of an inner solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Accuracy {
-    /// `c`, the [stiffness](crate::FlowParams::stiffness): the factor by which the energy magnifies errors of the step.
-    pub stiffness: f64,
-    /// Accuracy of the minimizer, relative to the motion.
-    pub tolerance: f64,
-    /// Reduction of the residual in the outer linear solves.
-    pub cg_tolerance: f64,
-}
-
-impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
-    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
-        MeanCurvatureOperator::apply(self, u)
-    }
-
-    fn allows_single_precision(&self) -> bool {
-        true
-    }
-
-    fn phase_preconditioner(&self, cells: usize, stiffness: f64) -> PhaseInverse<D> {
-        let inverse = MeanCurvatureOperator::phase_preconditioner(self, cells, stiffness);
-        Arc::new(move |r| spectral_filter(r.clone(), &inverse))
-    }
-}
-
-impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
-    fn apply(&self, u: Tensor<D>) -> Tensor<D> {
-        BrickOperator::apply(self, u)
-    }
-
-    fn allows_single_precision(&self) -> bool {
-        true
-    }
-
-    fn phase_preconditioner(&self, _cells: usize, stiffness: f64) -> PhaseInverse<D> {
-        Arc::new(BrickOperator::phase_preconditioner(self, stiffness))
-    }
-}
 
 /// A twice differentiable function of a grid of values.
 ///

@@ -1,9 +1,7 @@
 #![allow(missing_docs, reason = "messages and names say it")]
 
+use mean_curvature::StepFailure;
 use thiserror::Error as ThisError;
-
-/// Why a step of mean curvature flow failed.
-pub type StepFailure = Box<dyn std::error::Error + Send + Sync>;
 
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]
@@ -72,6 +70,9 @@ pub enum Error {
     NoInterface,
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
+    /// What a step of mean curvature flow refuses: a grid, scales, bricks.
+    #[error("{0}")]
+    Operator(StepFailure),
     #[error("the step of mean curvature flow failed: {0}")]
     Step(StepFailure),
     #[error("the term `{name}` of the energy has no derivatives")]

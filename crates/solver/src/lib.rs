@@ -2,9 +2,9 @@
 //!
 //! ```
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};
-//! use model::Shipped;
+//! use model::{MeanCurvatureOperator, Shipped};
 //! use operators::ComputeDevice;
-//! use solver::{FlowParams, LearnedStep, Problem, Stepper};
+//! use solver::{FlowParams, Problem, Stepper};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A disc of radius 0.2 grows under Willmore flow: R(t) = (r^4 + 2 t)^(1/4).
@@ -14,7 +14,7 @@
 //! let network = Shipped::Paper.find(params.ratios(&grid, 17))?;
 //! let disc = |radius| phase_field(grid, &Ball::<2>::new([0.0, 0.0], radius)?, params.eps);
 //!
-//! let problem = Problem::new(LearnedStep::new(&network, &device)?, &grid, params, &device)?;
+//! let problem = Problem::new(MeanCurvatureOperator::new(&network, &device)?, &grid, params, &device)?;
 //! let start = problem.start(&disc(0.2)?)?;
 //! let mut flow = Stepper::new(problem, start);
 //! let tau = params.mcf_step;
@@ -53,10 +53,8 @@ mod energy;
 mod error;
 mod euler;
 mod held;
-mod identity;
 mod interface;
-mod learned;
-mod mean_curvature;
+mod mean_curvature_flow;
 mod movement;
 mod newton;
 mod params;
@@ -77,21 +75,21 @@ pub use constraints::Constraints;
 pub use displacement::widths_between;
 pub use domain::{Domain, DomainScales};
 pub use energy::{
-    Accuracy, Coarser, EnergyTerm, EnergyTerms, Helfrich, MeanCurvatureStep, MinimizingMovement,
-    MovementGraph, Objective, Pressure, SpontaneousCurvature, Tension,
+    EnergyTerm, EnergyTerms, Helfrich, MinimizingMovement, MovementGraph, Objective, Pressure,
+    SpontaneousCurvature, Tension,
 };
-pub use error::{Error, StepFailure};
+pub use error::Error;
 pub use euler::Euler;
 pub use held::{Held, Target};
-pub use identity::Identity;
-pub use learned::LearnedStep;
-pub use mean_curvature::MeanCurvature;
-pub use model::Factors;
+pub use mean_curvature::{
+    Accuracy, Coarser, Factors, Identity, MeanCurvatureStep, PhaseInverse, PhaseInverses,
+    StepFailure, StepScales,
+};
+pub use mean_curvature_flow::MeanCurvatureFlow;
 pub use movement::{Minimizations, Minimum, Movement};
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
 pub use params::{FlowParams, Method, NewtonParams, Precision};
-pub use preconditioner::PhaseInverse;
 pub use problem::Problem;
 pub use record::{Start, StartKind, StepRecord};
 pub use scheme::{Candidate, Scheme, StepSize};

@@ -7,12 +7,12 @@ use geometry::{NodeSet, Nodes};
 
 use crate::constraints::{Constraints, Restoring};
 use crate::newton::{NewtonInfo, minimize_timed};
-use crate::preconditioner::{PhaseInverse, Preconditioner};
+use crate::preconditioner::Preconditioner;
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
     Accuracy, DeviceField, Domain, EnergyTerms, Error, Exit, FlowParams, MeanCurvatureStep,
-    MinimizingMovement, MovementGraph, Problem, State, bricks,
+    MinimizingMovement, MovementGraph, PhaseInverse, PhaseInverses, Problem, State, bricks,
 };
 
 /// One minimization, of `1/2 |s (u - a)|^2` and the weighted energy.
@@ -92,8 +92,15 @@ struct Prepared<const D: usize> {
     domain: Domain<D>,
     /// The energy, and the one with factors of the motion, each traced when it is first minimized.
     energies: [Option<MinimizingMovement<D>>; 2],
-    /// The inverse in the pure phases for a stiffness.
-    phase: Option<(u64, PhaseInverse<D>)>,
+    /// The inverses in the pure phases, and the one that is used.
+    inverses: PhaseInverses<D>,
+    phase: Option<Phase<D>>,
+}
+
+/// The inverse in the pure phases for a stiffness.
+struct Phase<const D: usize> {
+    stiffness: f64,
+    inverse: PhaseInverse<D>,
 }
 
 impl<const D: usize> Minimizations<D> {
@@ -202,6 +209,7 @@ impl<const D: usize> Minimizations<D> {
 impl<const D: usize> Prepared<D> {
     fn new(problem: &Problem<D>, nodes: &Nodes<D>) -> Result<Self, Error> {
         let step = problem.operator_on(nodes)?;
+        let inverses = step.phase_inverses(nodes, &problem.device);
         let region = problem.region.as_ref();
         let region = region.map(|region| Region::new(nodes, region, &problem.device));
         Ok(Self {
@@ -215,6 +223,7 @@ impl<const D: usize> Prepared<D> {
             region,
             domain: problem.domain(nodes),
             energies: [None, None],
+            inverses: inverses.map_err(Error::Operator)?,
             phase: None,
         })
     }
@@ -241,17 +250,21 @@ impl<const D: usize> Prepared<D> {
     /// Fits preconditioner and accuracy to a weight of the curvature.
     fn fit(&mut self, problem: &Problem<D>, stiffness: f64) -> PhaseInverse<D> {
         match &self.phase {
-            Some((prepared, phase)) if *prepared == stiffness.to_bits() => phase.clone(),
+            Some(phase) if phase.stiffness.to_bits() == stiffness.to_bits() => {
+                phase.inverse.clone()
+            }
             _ => {
-                let cells = problem.grid.cells();
-                let phase = self.step.phase_preconditioner(cells, stiffness);
-                self.phase = Some((stiffness.to_bits(), phase.clone()));
+                let inverse = (self.inverses)(stiffness);
+                self.phase = Some(Phase {
+                    stiffness,
+                    inverse: inverse.clone(),
+                });
                 self.step.set_accuracy(&Accuracy {
                     stiffness,
                     tolerance: problem.params.newton.tolerance,
                     cg_tolerance: problem.params.newton.cg_tolerance,
                 });
-                phase
+                inverse
             }
         }
     }

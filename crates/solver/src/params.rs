@@ -1,7 +1,8 @@
 //! Scales of a flow, and settings of the minimization.
 
 use geometry::{Grid, positive, require};
-use model::{Factors, Ratios};
+use mean_curvature::Factors;
+use model::Ratios;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;

@@ -1,17 +1,13 @@
 //! Preconditioners of the linear solves.
 
-use std::sync::Arc;
-
 use burn::tensor::Tensor;
 use geometry::Nodes;
+use mean_curvature::PhaseInverse;
 use operators::{ComputeDevice, SharedUpdate, update_on_host};
 
 use crate::Error;
 use crate::interface::InterfaceModes;
 use crate::region::Region;
-
-/// An approximate inverse of the Hessian in the pure phases, symmetric and positive definite, in the precision of what it is applied to.
-pub type PhaseInverse<const D: usize> = Arc<dyn Fn(&Tensor<D>) -> Tensor<D> + Send + Sync>;
 
 /// Which parts of the preconditioner.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -8,8 +8,11 @@ use operators::ComputeDevice;
 
 use crate::{
     DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held, MeanCurvatureStep,
-    State, bricks,
+    State, StepScales, bricks,
 };
+
+/// The side of the smallest bricks.
+const SMALLEST: usize = 8;
 
 /// A flow of phase fields: the step of mean curvature flow inside, the energy, and what may move.
 #[derive(Clone)]
@@ -22,7 +25,7 @@ pub struct Problem<const D: usize> {
     pub operator: Arc<dyn MeanCurvatureStep<D>>,
     /// What the energy has besides bending.
     pub terms: EnergyTerms<D>,
-    /// The motion of the step over that of the calibration (1 for an exact one; [`model::Calibration::response`]).
+    /// The motion of the step over that of the calibration (1 for an exact one; [`mean_curvature::Calibration::response`]).
     pub response: f64,
     /// The nodes whose values move, if not all; see [`Self::restrict_to`].
     pub region: Option<Arc<NodeSet>>,
@@ -38,7 +41,7 @@ impl<const D: usize> Problem<D> {
     /// Willmore flow everywhere on a grid, with nothing held.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for parameters.
+    /// [`Error::Geometry`] for parameters, [`Error::Operator`] if the step does not fit grid and parameters.
     pub fn new(
         operator: impl MeanCurvatureStep<D> + 'static,
         grid: &Grid<D>,
@@ -59,6 +62,8 @@ impl<const D: usize> Problem<D> {
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
         params.validate()?;
+        let scales = StepScales::on(grid, params.eps, params.mcf_step);
+        operator.check(&scales).map_err(Error::Operator)?;
         Ok(Self {
             grid: *grid,
             params,
@@ -86,14 +91,14 @@ impl<const D: usize> Problem<D> {
     /// constant there. That changes a flow by about a millionth of its motion; work and memory are in proportion to the length or area of the interface.
     ///
     /// # Errors
-    /// As [`Self::start`]; [`Error::NeedsGrid`] for an operator that does not work on bricks, [`Error::Geometry`] if the grid cannot be divided
+    /// As [`Self::start`]; [`Error::Operator`] for an operator that does not work on bricks, [`Error::Geometry`] if the grid cannot be divided
     /// into bricks, and [`Error::NoInterface`].
     pub fn start_on_bricks(&self, initial: &impl PhaseField<D>) -> Result<State<D>, Error> {
         self.check(initial)?;
-        let side = self.operator.brick_side().ok_or(Error::NeedsGrid {
-            what: "steps of mean curvature flow that are not made of the same convolutions along all axes",
-        })?;
+        let side = self.operator.brick_side().unwrap_or(SMALLEST);
         let nodes = bricks::near(initial, side, self.params.eps)?;
+        // An operator that does not work on bricks says why.
+        self.operator.on(&nodes).map_err(Error::Operator)?;
         let bricks = nodes.bricks().expect("they are near the interface");
         let values = (self.device).tensor(&initial.values_on(bricks), bricks.shape());
         let rests = self.operator.rests();
@@ -210,7 +215,7 @@ impl<const D: usize> Problem<D> {
             return Ok(0);
         };
         let coarser = self.operator.coarser(self.params.calibration);
-        let Some(coarser) = coarser.map_err(Error::Step)? else {
+        let Some(coarser) = coarser.map_err(Error::Operator)? else {
             return Ok(0);
         };
         let mut params = self.params;
@@ -257,7 +262,7 @@ impl<const D: usize> Problem<D> {
         nodes: &Nodes<D>,
     ) -> Result<Arc<dyn MeanCurvatureStep<D>>, Error> {
         match nodes.bricks() {
-            Some(_) => self.operator.on(nodes).map_err(Error::Step),
+            Some(_) => self.operator.on(nodes).map_err(Error::Operator),
             None => Ok(self.operator.clone()),
         }
     }

@@ -6,7 +6,8 @@ use crate::common::flow::Flow;
 use crate::common::{accurate, ball, device, network, params, ratios};
 use geometry::measure::{l2_distance, zero_set_volume};
 use geometry::{Field, Grid, exact};
-use model::{Calibration, Network, Shipped};
+use mean_curvature::Calibration;
+use model::{Network, Shipped};
 use solver::{Error, Factors, FlowParams};
 
 /// A radius of the reference experiment, `2^-4 pi`.

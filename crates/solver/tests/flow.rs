@@ -4,12 +4,14 @@ use crate::common::flow::Flow;
 use crate::common::{self, Scaled, ball, device, network, network_3d, params};
 use burn::tensor::Tensor;
 use geometry::measure::{l2_distance, perimeter, zero_set_volume};
-use geometry::{Field, Grid, exact};
+use geometry::{Field, Grid, Nodes, exact};
+use mean_curvature::{Identity, MeanCurvatureStep, PhaseInverses, StepFailure};
 use model::MeanCurvatureOperator;
-use operators::{SpectralFilter, spectral_filter};
+use operators::ComputeDevice;
+use serde_json::json;
 use solver::{
-    DeviceField, Error, Exit, FlowParams, MeanCurvatureStep, Method, MinimizingMovement,
-    NewtonParams, Objective, PhaseInverse, PhaseTimes, Precision, StepRecord, minimize,
+    DeviceField, Error, Exit, FlowParams, Method, MinimizingMovement, NewtonParams, Objective,
+    PhaseTimes, Precision, StepRecord, minimize,
 };
 use std::sync::Arc;
 
@@ -350,9 +352,17 @@ impl MeanCurvatureStep<2> for Pointwise {
         linearize::Extensions::new()
     }
 
-    fn phase_preconditioner(&self, cells: usize, _stiffness: f64) -> PhaseInverse<2> {
-        let filter = SpectralFilter::from_kernel(&[cells; 2], &[1.0], 1, |_| 1.0);
-        Arc::new(move |r| spectral_filter(r.clone(), &filter))
+    fn identity(&self) -> Identity {
+        Identity::new("pointwise", json!({ "logarithm": self.logarithm }))
+    }
+
+    /// The logarithm of -1 is none: there is nothing to be measured in that phase.
+    fn phase_inverses(
+        &self,
+        _nodes: &Nodes<2>,
+        _device: &ComputeDevice,
+    ) -> Result<PhaseInverses<2>, StepFailure> {
+        Ok(Arc::new(|_| Arc::new(|r: &Tensor<2>| r.clone())))
     }
 }
 

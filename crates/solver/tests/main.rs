@@ -7,6 +7,7 @@ mod constraints;
 mod domain;
 mod flow;
 mod helfrich;
+mod measured;
 mod minimization;
 mod profile;
 mod region;

@@ -3,9 +3,9 @@ use crate::prelude::*;
 use crate::surfaces;
 use fem::FiniteElementStep;
 use geometry::shapes::Torus;
+use mean_curvature::{Calibration, Factors};
 use model::training::SphereData;
-use model::{Calibration, NamedNetwork, Network, Shipped, displacement_errors};
-use solver::Factors;
+use model::{NamedNetwork, Network, Shipped, displacement_errors};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "calibration",

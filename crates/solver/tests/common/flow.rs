@@ -1,10 +1,10 @@
 //! A flow that is stepped by hand, by several schemes.
 use geometry::{Field, NodeSet, PhaseField, Stored};
-use model::Network;
+use model::{MeanCurvatureOperator, Network};
 use operators::ComputeDevice;
 use solver::{
-    Candidate, EnergyTerms, Error, Euler, FlowParams, Held, LearnedStep, MeanCurvature,
-    MeanCurvatureStep, Problem, Scheme, SecondOrder, State, StepRecord, StepSize,
+    Candidate, EnergyTerms, Error, Euler, FlowParams, Held, MeanCurvatureFlow, MeanCurvatureStep,
+    Problem, Scheme, SecondOrder, State, StepRecord, StepSize,
 };
 
 pub struct Flow<const D: usize> {
@@ -62,7 +62,7 @@ impl<const D: usize> Flow<D> {
         params: FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let step = LearnedStep::new(network, device)?;
+        let step = MeanCurvatureOperator::new(network, device)?;
         Self::new(step, initial, params, device)
     }
 
@@ -72,7 +72,7 @@ impl<const D: usize> Flow<D> {
         params: FlowParams,
         device: &ComputeDevice,
     ) -> Result<Self, Error> {
-        let step = LearnedStep::new(network, device)?;
+        let step = MeanCurvatureOperator::new(network, device)?;
         let problem = Problem::new(step, initial.nodes().grid(), params, device)?;
         let state = problem.start_on_bricks(initial)?;
         Ok(Self::of(problem, state))
@@ -103,7 +103,7 @@ impl<const D: usize> Flow<D> {
 
     pub fn advance_by_mean_curvature(&mut self) -> Result<(), Error> {
         let size = StepSize::whole(self.problem.params.mcf_step);
-        let candidate = MeanCurvature.step(&self.problem, &self.state, size)?;
+        let candidate = MeanCurvatureFlow.step(&self.problem, &self.state, size)?;
         assert!(self.take(candidate).is_none());
         Ok(())
     }

@@ -5,9 +5,9 @@ use crate::{Candidate, Error, Memory, Problem, Scheme, State, StepSize};
 
 /// Mean curvature flow, `u <- v[u]`: every step has the size of the step inside, and the whole grid is stored.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct MeanCurvature;
+pub struct MeanCurvatureFlow;
 
-impl<const D: usize> Scheme<D> for MeanCurvature {
+impl<const D: usize> Scheme<D> for MeanCurvatureFlow {
     /// # Errors
     /// [`Error::Step`] if the step's own solver fails, [`Error::NeedsGrid`] on bricks. A value that is not finite is reported by the
     /// [state](State::stored).

@@ -73,7 +73,7 @@ const RESIDUAL: f64 = 1e-8;
 /// Largest number of planes of a dense problem.
 const MOST_PLANES: f64 = 8192.0;
 /// Largest distance of the eigenvalue of translations from 1.
-const OFF: f64 = 1e-2;
+pub(crate) const OFF: f64 = 1e-2;
 
 /// Solves for the flat interface at `position` (in plane distances, from a plane).
 ///
@@ -129,28 +129,71 @@ pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, E
         None => (slope.clone(), psi.clone()),
     };
     let bending = step.bending(&w, &slope);
-    let response = dot(&bending, &psi);
-    let (psi_square, slope_square) = (dot(&psi, &dual_psi), dot(&slope, &mass_of_slope));
-    let interface = PlanarInterface {
-        energy: response * response / (psi_square * tautilde * tautilde * optimal_square),
-        metric: slope_square / optimal_square,
-        spontaneous_curvature: -eps * dot(&(&value - &w), &psi) / response,
-        displacement: -dot(&bending, &mass_of_slope) / (tautilde * slope_square),
-        alignment: dot(&psi, &slope).powi(2) / (psi_square * slope_square),
+    let modes = Modes {
+        optimal_square,
+        slope,
+        mass_of_slope,
+        psi,
+        dual_psi,
         eigenvalue,
+        residual: &value - &w,
+        bending,
     };
-    let PlanarInterface { energy, metric, .. } = interface;
-    if !(energy.is_finite() && energy > 0.0 && metric.is_finite() && metric > 0.0) {
-        return Err(Error::Calibration {
-            reason: "the step does not see curvature",
+    modes.interface(eps, tautilde)
+}
+
+/// What the factors follow from, on the planes of one flat interface.
+pub(crate) struct Modes {
+    /// `|q'|^2`.
+    pub(crate) optimal_square: f64,
+    /// The right null vector `w'`, which integrates to the jump between the phases, and `M w'`.
+    pub(crate) slope: Col<f64>,
+    pub(crate) mass_of_slope: Col<f64>,
+    /// The left null vector, and `M^-1 psi`.
+    pub(crate) psi: Col<f64>,
+    pub(crate) dual_psi: Col<f64>,
+    /// That of `psi`.
+    pub(crate) eigenvalue: f64,
+    /// `v[w] - w`.
+    pub(crate) residual: Col<f64>,
+    /// `A`.
+    pub(crate) bending: Col<f64>,
+}
+
+impl Modes {
+    /// The factors for an interface of this width in a step of this size.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] if they are not positive.
+    pub(crate) fn interface(&self, eps: f64, tautilde: f64) -> Result<PlanarInterface, Error> {
+        let (psi, slope, eigenvalue) = (&self.psi, &self.slope, self.eigenvalue);
+        let response = dot(&self.bending, psi);
+        let (psi_square, slope_square) =
+            (dot(psi, &self.dual_psi), dot(slope, &self.mass_of_slope));
+        let energy = response * response / (psi_square * tautilde * tautilde * self.optimal_square);
+        let metric = slope_square / self.optimal_square;
+        if !(energy.is_finite() && energy > 0.0 && metric.is_finite() && metric > 0.0) {
+            return Err(Error::Calibration {
+                reason: "the step does not see curvature",
+                eigenvalue,
+            });
+        }
+        Ok(PlanarInterface {
+            energy,
+            metric,
+            spontaneous_curvature: -eps * dot(&self.residual, psi) / response,
+            displacement: -dot(&self.bending, &self.mass_of_slope) / (tautilde * slope_square),
+            alignment: dot(psi, slope).powi(2) / (psi_square * slope_square),
             eigenvalue,
-        });
+        })
     }
-    Ok(interface)
 }
 
 /// Real and imaginary parts of the eigenvalues of `J` at the flat interface, largest real part first.
-pub(super) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64; 2]>, Error> {
+///
+/// # Errors
+/// [`Error::Calibration`] if there is no such interface, or the eigenvalues do not converge.
+pub(crate) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64; 2]>, Error> {
     let (start, optimal_slope) = optimal_interface(step, position);
     let w = flat_interface(step, &start, &optimal_slope)?;
     let (_, jacobian) = step.linearize(&w)?;
@@ -162,7 +205,7 @@ pub(super) fn spectrum(step: &impl PlanarStep, position: f64) -> Result<Vec<[f64
 }
 
 /// `q` and `q'` on the planes of the layer.
-pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
+pub fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f64>, Col<f64>) {
     let PlanarScales { eps, spacing, .. } = step.scales();
     let half = (HALF_WIDTH * eps / spacing).ceil();
     let planes = 2 * half as usize + 1;
@@ -174,7 +217,10 @@ pub(super) fn optimal_interface(step: &impl PlanarStep, position: f64) -> (Col<f
 
 /// The profile `w` with `v[w] - w = s q'` at the position of `start`, for some speed `s`: zero unless the step moves flat
 /// interfaces, up to what the grid holds on to.
-pub(super) fn flat_interface(
+///
+/// # Errors
+/// [`Error::Calibration`] if Newton's method finds none.
+pub fn flat_interface(
     step: &impl PlanarStep,
     start: &Col<f64>,
     optimal_slope: &Col<f64>,
@@ -211,7 +257,7 @@ pub(super) fn flat_interface(
     Err(Error::uncalibrated("no flat interface is at rest"))
 }
 
-fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
+pub(crate) fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
 }
 

@@ -1,10 +1,11 @@
-//! The learned operator on planes of grid nodes.
+//! The calibration of the learned operator: what it does on planes of grid nodes.
 
 use faer::{Col, Mat};
+use mean_curvature::calibration::{PlanarScales, spectrum};
+use mean_curvature::{Calibration, PlanarStep, calibrate, normals};
 
-use super::{POSITIONS, PlanarScales, PlanarStep, calibrate, normals, on_one_thread, planar};
 use crate::ratios::offsets;
-use crate::{Calibration, Error, Mlp, Network};
+use crate::{Error, Mlp, Network};
 
 /// `V` for functions of `a . x` with an integer normal `a`: the kernel is summed over the planes `a . b = m`.
 struct NetworkOnPlanes<'a> {
@@ -72,7 +73,7 @@ impl PlanarStep for NetworkOnPlanes<'_> {
         self.scales
     }
 
-    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), Error> {
+    fn linearize(&self, w: &Col<f64>) -> Result<(Col<f64>, Mat<f64>), mean_curvature::Error> {
         let planes = w.nrows();
         let smoothed = self.smoothed(&self.kernel, w);
         let jets: Vec<_> = smoothed.iter().map(|&z| self.activation.jet(z)).collect();
@@ -98,11 +99,25 @@ impl PlanarStep for NetworkOnPlanes<'_> {
 impl Network {
     /// The calibration of the operator, computed anew (a tenth of a second at `eps = 2h`, seconds at `8h`).
     ///
+    /// ```
+    /// use model::{Ratios, Shipped};
+    ///
+    /// # fn main() -> Result<(), model::Error> {
+    /// let ratios = Ratios { dimension: 2, width: 17, eps_over_h: 2.0, step_over_h2: 1.0 };
+    /// let calibration = Shipped::Paper.find(ratios)?.calibrate()?;
+    /// println!("c = {:.4}, m = {:.4}", calibration.factors.energy, calibration.factors.metric);
+    /// assert!((calibration.factors.energy - 0.932).abs() < 0.002);
+    /// // The left null vector is not the interface's translation, as it would be for a gradient flow.
+    /// assert!(calibration.alignment < 0.985);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
-    /// [`Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
+    /// [`mean_curvature::Error::Calibration`] if the operator has no flat interface at rest, as after too little training.
     pub fn calibrate(&self) -> Result<Calibration, Error> {
         let step = |normal: &[isize]| NetworkOnPlanes::new(self, normal);
-        calibrate(normals(self.ratios().dimension), step)
+        Ok(calibrate(normals(self.ratios().dimension), step)?)
     }
 
     /// Eigenvalues of `J`, the derivative of the operator at its flat interface normal to an axis, largest real part first. The
@@ -111,16 +126,15 @@ impl Network {
     pub fn flat_spectrum(&self) -> Result<Vec<[f64; 2]>, Error> {
         let (normal, _) = normals(self.ratios().dimension)[0];
         let step = NetworkOnPlanes::new(self, normal);
-        on_one_thread(|| planar::spectrum(&step, POSITIONS[0]))
+        Ok(spectrum(&step)?)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::planar::{flat_interface, optimal_interface};
-    use super::super::{normals, solve};
     use super::*;
     use crate::Shipped;
+    use mean_curvature::calibration::{flat_interface, optimal_interface, solve};
 
     fn dot(a: &Col<f64>, b: &Col<f64>) -> f64 {
         a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()

@@ -15,26 +15,14 @@
 //! of it is a small dense problem in one dimension ([`PlanarStep`]), solved for several positions of the interface between the
 //! planes and several normals.
 //!
-//! ```
-//! use model::{Ratios, Shipped};
-//!
-//! # fn main() -> Result<(), model::Error> {
-//! let ratios = Ratios { dimension: 2, width: 17, eps_over_h: 2.0, step_over_h2: 1.0 };
-//! let calibration = Shipped::Paper.find(ratios)?.calibrate()?;
-//! println!("c = {:.4}, m = {:.4}", calibration.factors.energy, calibration.factors.metric);
-//! assert!((calibration.factors.energy - 0.932).abs() < 0.002);
-//! // The left null vector is not the interface's translation, as it would be for a gradient flow.
-//! assert!(calibration.alignment < 0.985);
-//! # Ok(())
-//! # }
-//! ```
-
-mod network;
-mod planar;
+//! A step of which only its values are known is [measured](crate::measured) instead.
 
 use serde::{Deserialize, Serialize};
 
-pub use planar::{PlanarInterface, PlanarScales, PlanarStep, solve};
+use crate::planar;
+pub use crate::planar::{
+    PlanarInterface, PlanarScales, PlanarStep, flat_interface, optimal_interface, solve,
+};
 
 use crate::Error;
 
@@ -99,7 +87,7 @@ impl Calibration {
     }
 
     /// Whether all of its numbers are, as those in files must be.
-    pub(crate) fn is_finite(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         let Self {
             factors: Factors { energy, metric },
             spontaneous_curvature,
@@ -134,7 +122,7 @@ pub fn normals(dimension: usize) -> &'static [(&'static [isize], f64)] {
 }
 
 /// Positions of the interface between two planes, in fractions of their distance.
-const POSITIONS: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
+pub(crate) const POSITIONS: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
 
 /// Calibrates a step given on planes, by their normals and the weights of these.
 ///
@@ -144,27 +132,49 @@ pub fn calibrate<S: PlanarStep>(
     normals: &[(&[isize], f64)],
     step: impl Fn(&[isize]) -> S + Sync,
 ) -> Result<Calibration, Error> {
-    let work = || -> Result<Vec<(Vec<PlanarInterface>, f64)>, Error> {
+    let work = || -> Result<Vec<OfNormal>, Error> {
         let all = normals.iter().map(|(normal, weight)| {
             let step = step(normal);
             let interfaces: Result<Vec<_>, _> =
                 POSITIONS.map(|s| solve(&step, s)).into_iter().collect();
-            Ok((interfaces?, *weight))
+            Ok(OfNormal {
+                interfaces: interfaces?,
+                weight: *weight,
+            })
         });
         all.collect()
     };
-    let all = on_one_thread(work)?;
-    let total: f64 = all.iter().map(|(_, weight)| weight).sum();
+    Ok(mean(&on_one_thread(work)?))
+}
+
+/// The interfaces with one normal, at several positions, and the weight of that normal.
+pub(crate) struct OfNormal {
+    pub(crate) interfaces: Vec<PlanarInterface>,
+    pub(crate) weight: f64,
+}
+
+/// The means over positions and normals, and how much is between them.
+pub(crate) fn mean(all: &[OfNormal]) -> Calibration {
+    let total: f64 = all.iter().map(|normal| normal.weight).sum();
+    let over_positions = |normal: &OfNormal, f: fn(&PlanarInterface) -> f64| -> f64 {
+        normal.interfaces.iter().map(f).sum::<f64>() / normal.interfaces.len() as f64
+    };
     let mean = |f: fn(&PlanarInterface) -> f64| -> f64 {
-        let means =
-            (all.iter()).map(|(i, weight)| weight * i.iter().map(f).sum::<f64>() / i.len() as f64);
+        let means = all.iter().map(|normal| {
+            let sum = normal.interfaces.iter().map(f).sum::<f64>();
+            normal.weight * sum / normal.interfaces.len() as f64
+        });
         means.sum::<f64>() / total
     };
-    let energies =
-        (all.iter()).map(|(i, _)| i.iter().map(|i| i.energy).sum::<f64>() / i.len() as f64);
-    let position_spreads = (all.iter()).map(|(i, _)| spread(i.iter().map(|i| i.energy)));
-    let eigenvalues = all.iter().flat_map(|(i, _)| i.iter().map(|i| i.eigenvalue));
-    Ok(Calibration {
+    let energies: Vec<f64> = (all.iter())
+        .map(|normal| over_positions(normal, |i| i.energy))
+        .collect();
+    let position_spreads =
+        (all.iter()).map(|normal| spread(normal.interfaces.iter().map(|i| i.energy)));
+    let eigenvalues = all
+        .iter()
+        .flat_map(|normal| normal.interfaces.iter().map(|i| i.eigenvalue));
+    Calibration {
         factors: Factors {
             energy: mean(|i| i.energy),
             metric: mean(|i| i.metric),
@@ -177,8 +187,16 @@ pub fn calibrate<S: PlanarStep>(
             if worse { e } else { worst }
         }),
         position_spread: position_spreads.fold(0.0, f64::max),
-        normal_spread: spread(energies),
-    })
+        normal_spread: spread(energies.iter().copied()),
+    }
+}
+
+/// Eigenvalues of `J`, the derivative of a step at its flat interface, as real and imaginary parts, largest real part first.
+///
+/// # Errors
+/// [`Error::Calibration`] if there is no such interface, or the eigenvalues do not converge.
+pub fn spectrum(step: &impl PlanarStep) -> Result<Vec<[f64; 2]>, Error> {
+    on_one_thread(|| planar::spectrum(step, POSITIONS[0]))
 }
 
 /// The order of sums in factorizations depends on the number of threads.

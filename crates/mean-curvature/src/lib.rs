@@ -1,0 +1,18 @@
+//! Steps of mean curvature flow `v[u]`: what a solver asks of one, and what one makes of the Willmore energy.
+//!
+//! [`MeanCurvatureStep`] is the trait that learned operators, finite elements and a person's own steps implement. The solver of Willmore
+//! flow measures curvature as `|v[u] - u|^2 / tautilde^2` with any of them. [`calibration`] says what that makes of the Willmore energy,
+//! [`measured`] finds it, and the inverse in the pure phases, for steps that only say what `v[u]` is.
+
+pub mod calibration;
+mod error;
+pub mod measured;
+mod planar;
+mod step;
+
+pub use calibration::{Calibration, Factors, PlanarStep, calibrate, normals};
+pub use error::Error;
+pub use step::{
+    Accuracy, Coarser, Identity, MeanCurvatureStep, PhaseInverse, PhaseInverses, StepFailure,
+    StepScales,
+};
