@@ -218,12 +218,17 @@ impl<const D: usize> Operator<D> {
         step: impl MeanCurvatureStep<D> + 'static,
         calibration: Option<&Calibration>,
     ) -> Self {
+        Self::shared(Arc::new(step), calibration)
+    }
+
+    /// The same with a step that is shared.
+    pub fn shared(step: Arc<dyn MeanCurvatureStep<D>>, calibration: Option<&Calibration>) -> Self {
         let scheme = calibration.map_or(Scheme::Paper, |_| Scheme::Calibrated);
         let mut operator = Self::plain(Method::Own, scheme);
         if let Some(calibration) = calibration {
             operator.calibrate(calibration);
         }
-        operator.own = Some(Arc::new(step));
+        operator.own = Some(step);
         operator
     }
 

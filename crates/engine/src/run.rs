@@ -147,6 +147,18 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
+    /// Makes so many time steps, or fewer if a stop rule ends them: an iterator over their records, of which those of a step that is made in
+    /// parts are several. Steps are made as it goes on.
+    pub fn take(&mut self, steps: usize) -> impl Iterator<Item = Result<Record, Error>> {
+        let last = self.steps() + steps;
+        std::iter::from_fn(move || {
+            if self.steps() >= last {
+                return None;
+            }
+            self.step().map(|record| record.cloned()).transpose()
+        })
+    }
+
     /// A step that the controller takes, and its record without what the phase field says.
     fn candidate(&mut self) -> Result<(Candidate<D>, Record), Error> {
         loop {

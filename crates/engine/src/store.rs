@@ -317,6 +317,9 @@ fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), Error> {
     if found == wanted {
         return Ok(());
     }
+    if let Some(own) = own_parts(found, wanted) {
+        return Err(refused(stored, own));
+    }
     let keys = [wanted, found].into_iter().filter_map(Value::as_object);
     let keys: BTreeSet<&String> = keys.flat_map(|map| map.keys()).collect();
     let keys = keys.into_iter().filter(|key| found[key] != wanted[key]);
@@ -324,6 +327,35 @@ fn check_identity(stored: &StoredRun, wanted: &Value) -> Result<(), Error> {
     let differing = differing.collect::<Vec<_>>().join("; ");
     let reason = format!("it is of another case ({differing}); start a new run in another folder");
     Err(refused(stored, reason))
+}
+
+/// What a stored run has of one's own that is not there now, by name.
+fn own_parts(found: &Value, wanted: &Value) -> Option<String> {
+    let names = |parts: &Value| -> Vec<String> {
+        let name = |part: &Value| match part {
+            Value::String(name) => name.clone(),
+            part => part["name"].as_str().map_or_else(|| part.to_string(), str::to_owned),
+        };
+        match parts {
+            Value::Null => Vec::new(),
+            Value::Array(parts) => parts.iter().map(name).collect(),
+            part => vec![name(part)],
+        }
+    };
+    let kinds = [
+        ("term of the energy", &found["own_terms"], &wanted["own_terms"]),
+        ("operator", &found["operator"]["own"], &wanted["operator"]["own"]),
+        ("scheme", &found["own_scheme"], &wanted["own_scheme"]),
+        ("controller", &found["own_controller"], &wanted["own_controller"]),
+        ("stop rule", &found["own_stops"], &wanted["own_stops"]),
+    ];
+    kinds.into_iter().find_map(|(kind, found, wanted)| {
+        let wanted = names(wanted);
+        let missing = names(found).into_iter().find(|name| !wanted.contains(name))?;
+        Some(format!(
+            "it was made with the {kind} {missing:?}, which this program does not have; go on with the program that made it"
+        ))
+    })
 }
 
 fn grid<const D: usize>(stored: &StoredRun) -> Result<Grid<D>, Error> {

@@ -80,6 +80,16 @@ impl<const D: usize> Domain<D> {
         }
     }
 
+    /// The same for values that are stored at other nodes.
+    #[must_use]
+    pub fn on(&self, nodes: &Nodes<D>) -> Self {
+        let nodes = nodes.clone();
+        Self {
+            nodes,
+            ..self.clone()
+        }
+    }
+
     /// The device where numbers are computed.
     pub fn device(&self) -> &ComputeDevice {
         &self.home

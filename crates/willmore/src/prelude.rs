@@ -1,0 +1,33 @@
+//! All that a program of one's own needs, with one `use`.
+
+pub use crate::{Start, Willmore};
+pub use engine::{
+    Attempts, Case, Checkpoints, Controller, Current, EqualSteps, ErrorControl, Event, Measure,
+    Method, Observer, Operator, Order, Own, Progress, Record, Run, Samples, Scales,
+    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, Storage, Store, TimeSteps,
+    Trajectory, Verdict,
+};
+pub use fem::FiniteElementStep;
+pub use crate::Error as FlowError;
+pub use geometry::exact;
+pub use geometry::measure::{l2_distance, perimeter, zero_set_volume};
+pub use geometry::shapes::*;
+pub use geometry::{
+    Field, Grid, NodeSet, Nodes, PhaseField, SignedDistance, SignedDistanceExt, Stored, ZeroSet,
+    distance_from_phase_field, optimal_profile, phase_field,
+};
+pub use mean_curvature::{
+    Calibration, Factors, Identity, MeanCurvatureStep, PhaseInverses, StepFailure, StepScales,
+};
+pub use model::training::SphereData;
+pub use model::{MeanCurvatureOperator, Network, Networks, Ratios, Shipped};
+pub use operators::{ComputeDevice, circular_convolution};
+pub use runs::{Interrupt, RunDirectory};
+pub use serde_json::json;
+pub use solver::{
+    Candidate, DeviceField, Domain, EnergyTerm, Euler, FlowParams, Held, Helfrich,
+    MeanCurvatureFlow, Memory, Minimizations, Movement, NewtonParams, Pressure, Problem, Scheme,
+    SecondOrder, SpontaneousCurvature, State, StepEstimates, StepRecord, StepSize, Stepper,
+    Target, Tension, widths_between,
+};
+pub use solver::{DomainScales, Error as StepError};

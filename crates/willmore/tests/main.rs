@@ -1,0 +1,4 @@
+//! Parts of one's own in every combination, and the examples.
+
+mod examples;
+mod own;

@@ -1,0 +1,171 @@
+//! What parts of one's own get from the loop: bricks, control of the steps, held sizes, and resuming to the same bytes.
+
+use std::path::Path;
+
+use willmore::prelude::*;
+
+use crate::examples::own_energy::Gravity;
+use crate::examples::own_operator;
+use crate::examples::own_scheme::StepDoubling;
+
+/// Minimizations so accurate that only what is compared makes a difference.
+fn exact_newton() -> NewtonParams {
+    NewtonParams {
+        tolerance: 1e-7,
+        cg_tolerance: 1e-4,
+        ..NewtonParams::default()
+    }
+}
+
+fn grid() -> Grid<2> {
+    Grid::per_unit(64, 2.0).unwrap()
+}
+
+fn egg() -> Ellipse {
+    Ellipse::new([0.3, 0.2]).unwrap()
+}
+
+fn heavy() -> Willmore<2> {
+    Willmore::on(grid()).with(Gravity { g: 2e4 })
+}
+
+fn doubling() -> Willmore<2> {
+    Willmore::on(grid()).scheme(StepDoubling::default)
+}
+
+fn allen_cahn() -> Willmore<2> {
+    own_operator::flow().unwrap()
+}
+
+/// The difference of both ways of storing after two steps, over the motion.
+fn difference(flow: impl Fn() -> Willmore<2>, steps: impl Into<TimeSteps>) -> f64 {
+    let steps = steps.into();
+    let [dense, bricks] = [Storage::Dense, Storage::Bricks].map(|storage| {
+        let flow = flow().storage(storage).steps(steps).newton(exact_newton());
+        let mut flow = flow.start(&egg()).unwrap();
+        for record in flow.take(2) {
+            record.unwrap();
+        }
+        assert_eq!(flow.stored_cells() < grid().len(), storage == Storage::Bricks);
+        flow
+    });
+    let start = dense.case().initial.field().unwrap();
+    let way = l2_distance(dense.field(), &start).unwrap();
+    l2_distance(dense.field(), bricks.field()).unwrap() / way
+}
+
+fn tau() -> f64 {
+    0.5 * grid().spacing().powi(4) / 16.0
+}
+
+#[test]
+fn on_bricks_an_own_term_is_that_of_the_whole_grid() {
+    let equal = StepRule::Constant(16.0 * tau());
+    let second = TimeSteps {
+        order: Order::Second,
+        ..equal.into()
+    };
+    for steps in [equal.into(), second] {
+        let apart = difference(heavy, steps);
+        assert!(apart > 0.0 && apart < 1e-5, "{apart:e}");
+    }
+}
+
+#[test]
+fn on_bricks_an_own_scheme_is_that_of_the_whole_grid() {
+    let apart = difference(doubling, StepRule::Constant(16.0 * tau()));
+    assert!(apart > 0.0 && apart < 1e-5, "{apart:e}");
+}
+
+#[test]
+fn steps_of_own_parts_are_controlled_by_their_errors() {
+    for flow in [heavy(), doubling(), allen_cahn()] {
+        let mut flow = flow.start(&egg()).unwrap();
+        let records: Vec<Record> = flow.take(6).map(Result::unwrap).collect();
+        let error = |record: &Record| record.minimization.unwrap().estimates.unwrap().error;
+        assert!(records.iter().any(|record| error(record).is_some()));
+        let sizes: Vec<f64> = records.iter().map(|record| record.tau).collect();
+        assert!(sizes.windows(2).any(|pair| pair[0] != pair[1]), "{sizes:?}");
+        let energies: Vec<f64> = records.iter().filter_map(Record::willmore_energy).collect();
+        assert!(energies.windows(2).all(|pair| pair[1] < pair[0]), "{energies:?}");
+    }
+}
+
+/// Euler's scheme has no estimates.
+#[test]
+fn a_scheme_without_estimates_is_not_controlled_by_them() {
+    let refused = Willmore::on(grid()).scheme(Euler::new).start(&egg());
+    let error = refused.err().unwrap().to_string();
+    assert!(error.contains("euler") && error.contains("estimate"), "{error}");
+}
+
+#[test]
+fn sizes_are_held_with_own_parts() {
+    for flow in [heavy(), doubling(), allen_cahn()] {
+        let mut flow = flow.keep_volume().start(&egg()).unwrap();
+        let eps = flow.case().scales.eps;
+        let area = |u: &Field<2>| ZeroSet::of(u, eps).unwrap().volume;
+        let before = area(flow.field());
+        for record in flow.take(3) {
+            record.unwrap();
+        }
+        let after = area(flow.field());
+        assert!((after / before - 1.0).abs() < 1e-9, "{before} {after}");
+    }
+}
+
+/// Asks for an end after so many records.
+struct After(usize, Interrupt);
+
+impl Observer<2> for After {
+    fn observe(&mut self, event: &mut Event<'_, 2>) -> Result<(), FlowError> {
+        if event.run.records().len() == self.0 {
+            self.1.request();
+        }
+        Ok(())
+    }
+}
+
+/// The bits of the phase field after four steps in a folder, interrupted or not after two.
+fn four_steps(flow: impl Fn() -> Willmore<2>, folder: &Path, interrupted: bool) -> Vec<u64> {
+    let run = |until: usize| {
+        let (mut store, mut run) = flow().until(Stop::Steps(4)).start_in(folder, &egg()).unwrap();
+        let interrupt = Interrupt::never();
+        let mut after = After(until, interrupt.clone());
+        run.advance(Some(&mut store), &mut [&mut after], &interrupt).unwrap();
+        run
+    };
+    if interrupted {
+        assert_eq!(run(2).records().len(), 2);
+    }
+    let run = run(usize::MAX);
+    assert_eq!(run.records().len(), 4);
+    run.field().values().iter().map(|u| u.to_bits()).collect()
+}
+
+#[test]
+fn runs_with_own_parts_go_on_to_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    type Make = fn() -> Willmore<2>;
+    let flows: [(&str, Make); 4] = [
+        ("term", heavy),
+        ("scheme", doubling),
+        ("operator", allen_cahn),
+        ("term on bricks", || heavy().storage(Storage::Bricks).keep_volume()),
+    ];
+    for (name, flow) in flows {
+        let [whole, parts] = ["whole", "parts"].map(|part| root.path().join(format!("{name} {part}")));
+        let same = four_steps(flow, &whole, false) == four_steps(flow, &parts, true);
+        assert!(same, "{name}");
+    }
+}
+
+#[test]
+fn what_a_program_does_not_have_is_named() {
+    let root = tempfile::tempdir().unwrap();
+    let (store, run) = heavy().start_in(root.path().join("run"), &egg()).unwrap();
+    drop((store, run));
+    let refused = Willmore::on(grid()).start_in(root.path().join("run"), &egg());
+    let error = refused.err().unwrap().to_string();
+    assert!(error.contains("the term of the energy \"gravity\""), "{error}");
+}
