@@ -334,7 +334,9 @@ fn own_parts(found: &Value, wanted: &Value) -> Option<String> {
     let names = |parts: &Value| -> Vec<String> {
         let name = |part: &Value| match part {
             Value::String(name) => name.clone(),
-            part => part["name"].as_str().map_or_else(|| part.to_string(), str::to_owned),
+            part => part["name"]
+                .as_str()
+                .map_or_else(|| part.to_string(), str::to_owned),
         };
         match parts {
             Value::Null => Vec::new(),
@@ -343,10 +345,22 @@ fn own_parts(found: &Value, wanted: &Value) -> Option<String> {
         }
     };
     let kinds = [
-        ("term of the energy", &found["own_terms"], &wanted["own_terms"]),
-        ("operator", &found["operator"]["own"], &wanted["operator"]["own"]),
+        (
+            "term of the energy",
+            &found["own_terms"],
+            &wanted["own_terms"],
+        ),
+        (
+            "operator",
+            &found["operator"]["own"],
+            &wanted["operator"]["own"],
+        ),
         ("scheme", &found["own_scheme"], &wanted["own_scheme"]),
-        ("controller", &found["own_controller"], &wanted["own_controller"]),
+        (
+            "controller",
+            &found["own_controller"],
+            &wanted["own_controller"],
+        ),
         ("stop rule", &found["own_stops"], &wanted["own_stops"]),
     ];
     kinds.into_iter().find_map(|(kind, found, wanted)| {

@@ -8,6 +8,7 @@ pub struct ByNewton {
 }
 
 impl ByNewton {
+    /// The first step has this size.
     pub fn from(tau: f64) -> Self {
         Self { tau }
     }
@@ -48,6 +49,7 @@ impl<const D: usize> Controller<D> for ByNewton {
     }
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let first = 0.25 * grid.spacing().powi(4);

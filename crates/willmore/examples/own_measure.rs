@@ -12,6 +12,7 @@ pub fn reach() -> Measure<2> {
     })
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)
@@ -20,7 +21,11 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let start = flow.start()["reach"];
     for record in flow.take(5) {
         let record = record?;
-        println!("t = {:.2e}: reaches to {:.4}", record.time, record.measure("reach").unwrap());
+        println!(
+            "t = {:.2e}: reaches to {:.4}",
+            record.time,
+            record.measure("reach").unwrap()
+        );
     }
     let end = flow.records().last().and_then(|last| last.measure("reach"));
     assert!((start - 0.3).abs() < 0.02 && end.is_some());

@@ -58,8 +58,11 @@ pub fn flow() -> Result<Willmore<2>, Box<dyn std::error::Error>> {
     Ok(flow.operator(step).device(&device))
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut flow = flow()?.until(Stop::Time(2e-4)).start(&Ball::new([0.0; 2], 0.2)?)?;
+    let mut flow = flow()?
+        .until(Stop::Time(2e-4))
+        .start(&Ball::new([0.0; 2], 0.2)?)?;
     while let Some(record) = flow.step()? {
         let time = record.time;
         let radius = (zero_set_volume(&flow.current()) / std::f64::consts::PI).sqrt();

@@ -38,7 +38,9 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
         let made = made.map(|last| StepRecord {
             step: state.step,
             tau: size.tau,
-            energy_before: whole.made.map_or(last.energy_before, |made| made.energy_before),
+            energy_before: whole
+                .made
+                .map_or(last.energy_before, |made| made.energy_before),
             energy: 2.0 * size.tau * last.willmore_energy,
             estimates: Some(estimates),
             ..last
@@ -55,6 +57,7 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
     }
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)
@@ -63,8 +66,14 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     for record in flow.take(6) {
         let record = record?;
         let made = record.minimization.expect("it minimizes");
-        let error = made.estimates.and_then(|lengths| lengths.error).expect("it estimates");
-        println!("t = {:.2e}, tau = {:.2e}: off by {error:.1e}", record.time, record.tau);
+        let error = made
+            .estimates
+            .and_then(|lengths| lengths.error)
+            .expect("it estimates");
+        println!(
+            "t = {:.2e}, tau = {:.2e}: off by {error:.1e}",
+            record.time, record.tau
+        );
         assert!(error < 0.1 * grid.spacing());
     }
     Ok(())

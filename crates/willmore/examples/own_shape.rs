@@ -4,7 +4,9 @@ use willmore::prelude::*;
 
 /// Two discs of different radii, and all that is between them: the convex hull, with the exact distance.
 pub struct Egg {
+    /// Of the discs at both ends.
     pub radii: [f64; 2],
+    /// From one centre to the other.
     pub length: f64,
 }
 
@@ -26,6 +28,7 @@ impl SignedDistance<2> for Egg {
     }
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let egg = Egg {
         radii: [0.25, 0.12],
@@ -35,7 +38,11 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut flow = Willmore::on(grid).start(&egg)?;
     for record in flow.take(5) {
         let record = record?;
-        println!("t = {:.2e}: w = {:.3}", record.time, record.willmore_energy().unwrap());
+        println!(
+            "t = {:.2e}: w = {:.3}",
+            record.time,
+            record.willmore_energy().unwrap()
+        );
     }
     Ok(())
 }

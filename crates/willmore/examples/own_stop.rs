@@ -4,11 +4,13 @@ use willmore::prelude::*;
 
 /// Holds where the isoperimetric quotient `4 pi A / L^2`, 1 for a circle, has come to a value.
 pub struct Round {
+    /// The quotient at which the flow ends.
     pub quotient: f64,
-    pub name: String,
+    name: String,
 }
 
 impl Round {
+    /// The rule for a quotient.
     pub fn at(quotient: f64) -> Self {
         let name = format!("round to {quotient}");
         Self { quotient, name }
@@ -22,13 +24,15 @@ impl StopRule<2> for Round {
 
     fn holds(&self, progress: &Progress<'_, 2>) -> bool {
         let last = progress.records.last();
-        let sizes = last.and_then(|last| Some((last.measure("volume")?, last.measure("perimeter")?)));
+        let sizes =
+            last.and_then(|last| Some((last.measure("volume")?, last.measure("perimeter")?)));
         sizes.is_some_and(|(area, length)| {
             4.0 * std::f64::consts::PI * area / (length * length) >= self.quotient
         })
     }
 }
 
+/// Runs the example; a test does, too.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)

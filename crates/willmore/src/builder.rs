@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use engine::{
-    Case, Checkpoints, Controller, ErrorControl, Measure, Operator, Own, Run, Scales, Scheme,
-    Stop, StopRule, Storage, Store, TimeSteps,
+    Case, Checkpoints, Controller, ErrorControl, Measure, Observer, Operator, Own, Run, Scales,
+    Scheme, Stop, StopRule, Storage, Store, TimeSteps,
 };
-use geometry::{Field, Grid, NodeSet, SignedDistance, Stored, ZeroSet, stored_phase_field};
+use geometry::{Grid, NodeSet, SignedDistance, Stored, ZeroSet, stored_phase_field};
 use mean_curvature::{MeanCurvatureStep, StepScales};
 use model::{NamedNetwork, Network, Networks};
 use operators::ComputeDevice;
-use runs::RunDirectory;
+use runs::{Interrupt, RunDirectory};
 use solver::{EnergyTerm, Held, NewtonParams, Target};
 
 /// What a flow cannot begin with, or what stopped it.
@@ -21,28 +21,6 @@ pub type Error = engine::Error;
 const STEPS: usize = 1_000_000;
 /// Cells of the interface width `eps`.
 const EPS_OVER_H: f64 = 2.0;
-
-/// Where a flow starts: a shape by its signed distance, or a phase field.
-pub trait Start<const D: usize> {
-    /// The phase field of interface width `eps`.
-    ///
-    /// # Errors
-    /// [`Error::Geometry`] for values that are not finite, or a phase field on another grid.
-    fn phase_field(&self, grid: &Grid<D>, eps: f64) -> Result<Stored<D>, Error>;
-}
-
-impl<const D: usize, S: SignedDistance<D>> Start<D> for S {
-    fn phase_field(&self, grid: &Grid<D>, eps: f64) -> Result<Stored<D>, Error> {
-        Ok(stored_phase_field(*grid, self, eps)?)
-    }
-}
-
-impl<const D: usize> Start<D> for Field<D> {
-    fn phase_field(&self, grid: &Grid<D>, _eps: f64) -> Result<Stored<D>, Error> {
-        grid.same_as(self.grid())?;
-        Ok(self.clone().into())
-    }
-}
 
 /// A flow that is put together: on a grid, by methods that change its defaults, to be [started](Self::start) from a shape.
 ///
@@ -249,13 +227,21 @@ impl<const D: usize> Willmore<D> {
         scales
     }
 
-    /// The case of the flow from a shape or a phase field, for what takes cases.
+    /// The case of the flow from a shape, for what takes cases.
     ///
     /// # Errors
-    /// [`Error::Model`] if no network fits, [`Error::Geometry`], and those of measuring a calibration.
-    pub fn case(&self, start: &impl Start<D>) -> Result<Case<D>, Error> {
-        let scales = self.scales();
-        let initial = start.phase_field(&self.grid, scales.eps)?;
+    /// [`engine::Error::Model`] if no network fits, [`engine::Error::Geometry`], and those of measuring a calibration.
+    pub fn case(&self, shape: &impl SignedDistance<D>) -> Result<Case<D>, Error> {
+        self.case_from(stored_phase_field(self.grid, shape, self.scales().eps)?)
+    }
+
+    /// The case of the flow from a phase field on the grid.
+    ///
+    /// # Errors
+    /// As [`Self::case`].
+    pub fn case_from(&self, initial: impl Into<Stored<D>>) -> Result<Case<D>, Error> {
+        let (scales, initial) = (self.scales(), initial.into());
+        self.grid.same_as(initial.grid())?;
         let mut operator = self.operator_inside(&scales)?;
         operator.storage = self.storage;
         let mut stops = self.stops.clone();
@@ -279,7 +265,7 @@ impl<const D: usize> Willmore<D> {
     fn operator_inside(&self, scales: &Scales) -> Result<Operator<D>, Error> {
         if let Some(step) = &self.step {
             let scales = StepScales::on(&self.grid, scales.eps, scales.mcf_step);
-            let calibration = step.calibrate(&scales, &self.device()?);
+            let calibration = step.calibrate(&scales, &self.chosen_device()?);
             let calibration = calibration.map_err(solver::Error::Operator)?;
             return Ok(Operator::shared(step.clone(), Some(&calibration)));
         }
@@ -307,41 +293,72 @@ impl<const D: usize> Willmore<D> {
         })
     }
 
-    fn device(&self) -> Result<ComputeDevice, Error> {
+    fn chosen_device(&self) -> Result<ComputeDevice, Error> {
         match &self.device {
             Some(device) => Ok(device.clone()),
             None => Ok(ComputeDevice::default_compiled().map_err(solver::Error::from)?),
         }
     }
 
-    /// Starts the flow from a shape or a phase field.
+    /// Starts the flow from a shape.
     ///
     /// # Errors
     /// As [`Self::case`] and [`Run::new`].
-    pub fn start(&self, start: &impl Start<D>) -> Result<Run<D>, Error> {
-        Run::new(self.case(start)?, &self.device()?)
+    pub fn start(&self, shape: &impl SignedDistance<D>) -> Result<Run<D>, Error> {
+        Run::new(self.case(shape)?, &self.chosen_device()?)
     }
 
-    /// Starts the flow in a folder, with a checkpoint after every step, or goes on with the one that is stored there, to the same bytes.
+    /// Starts the flow from a phase field on the grid.
     ///
     /// # Errors
-    /// As [`Self::start`]; [`Error::Stored`] for a folder with another flow, [`Error::Runs`].
+    /// As [`Self::start`].
+    pub fn start_from(&self, initial: impl Into<Stored<D>>) -> Result<Run<D>, Error> {
+        Run::new(self.case_from(initial)?, &self.chosen_device()?)
+    }
+
+    /// Starts the flow from a shape in a folder, with a checkpoint after every step, or goes on with the flow that is stored there, to the same bytes.
+    ///
+    /// # Errors
+    /// As [`Self::start`]; [`engine::Error::Stored`] for a folder with another flow, [`engine::Error::Runs`].
     pub fn start_in(
         &self,
         folder: impl AsRef<Path>,
-        start: &impl Start<D>,
-    ) -> Result<(Store, Run<D>), Error> {
+        shape: &impl SignedDistance<D>,
+    ) -> Result<Kept<D>, Error> {
         let (folder, checkpoints) = (folder.as_ref(), Checkpoints::EverySteps(1));
-        let (case, device) = (self.case(start)?, self.device()?);
-        match RunDirectory::open(folder) {
-            Ok(stored) => Store::resume(stored, case, &device, checkpoints),
+        let (case, device) = (self.case(shape)?, self.chosen_device()?);
+        let (store, run) = match RunDirectory::open(folder) {
+            Ok(stored) => Store::resume(stored, case, &device, checkpoints)?,
             Err(runs::Error::NoRun(_)) => {
                 let run = Run::new(case, &device)?;
                 let notes = serde_json::Value::Null;
-                let store = Store::create(folder, &[], &run, notes, checkpoints)?;
-                Ok((store, run))
+                (Store::create(folder, &[], &run, notes, checkpoints)?, run)
             }
-            Err(error) => Err(error.into()),
-        }
+            Err(error) => return Err(error.into()),
+        };
+        Ok(Kept { store, run })
+    }
+}
+
+/// A flow that is kept in a folder.
+pub struct Kept<const D: usize> {
+    /// The folder.
+    pub store: Store,
+    /// The flow.
+    pub run: Run<D>,
+}
+
+impl<const D: usize> Kept<D> {
+    /// Makes steps until a stop rule holds or `interrupt` is set, with a checkpoint after each.
+    ///
+    /// # Errors
+    /// As [`Run::advance`].
+    pub fn advance(
+        &mut self,
+        observers: &mut [&mut dyn Observer<D>],
+        interrupt: &Interrupt,
+    ) -> Result<Option<Stop>, Error> {
+        self.run
+            .advance(Some(&mut self.store), observers, interrupt)
     }
 }

@@ -47,5 +47,5 @@
 mod builder;
 pub mod prelude;
 
-pub use builder::{Error, Start, Willmore};
+pub use builder::{Error, Kept, Willmore};
 pub use {engine, fem, geometry, linearize, mean_curvature, model, operators, runs, solver};

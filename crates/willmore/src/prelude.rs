@@ -1,14 +1,14 @@
 //! All that a program of one's own needs, with one `use`.
 
-pub use crate::{Start, Willmore};
+pub use crate::Error as FlowError;
+pub use crate::{Kept, Willmore};
 pub use engine::{
     Attempts, Case, Checkpoints, Controller, Current, EqualSteps, ErrorControl, Event, Measure,
     Method, Observer, Operator, Order, Own, Progress, Record, Run, Samples, Scales,
-    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, Storage, Store, TimeSteps,
-    Trajectory, Verdict,
+    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, Storage, Store, TimeSteps, Trajectory,
+    Verdict,
 };
 pub use fem::FiniteElementStep;
-pub use crate::Error as FlowError;
 pub use geometry::exact;
 pub use geometry::measure::{l2_distance, perimeter, zero_set_volume};
 pub use geometry::shapes::*;
@@ -27,7 +27,7 @@ pub use serde_json::json;
 pub use solver::{
     Candidate, DeviceField, Domain, EnergyTerm, Euler, FlowParams, Held, Helfrich,
     MeanCurvatureFlow, Memory, Minimizations, Movement, NewtonParams, Pressure, Problem, Scheme,
-    SecondOrder, SpontaneousCurvature, State, StepEstimates, StepRecord, StepSize, Stepper,
-    Target, Tension, widths_between,
+    SecondOrder, SpontaneousCurvature, State, StepEstimates, StepRecord, StepSize, Stepper, Target,
+    Tension, widths_between,
 };
 pub use solver::{DomainScales, Error as StepError};

@@ -46,7 +46,10 @@ fn difference(flow: impl Fn() -> Willmore<2>, steps: impl Into<TimeSteps>) -> f6
         for record in flow.take(2) {
             record.unwrap();
         }
-        assert_eq!(flow.stored_cells() < grid().len(), storage == Storage::Bricks);
+        assert_eq!(
+            flow.stored_cells() < grid().len(),
+            storage == Storage::Bricks
+        );
         flow
     });
     let start = dense.case().initial.field().unwrap();
@@ -87,7 +90,10 @@ fn steps_of_own_parts_are_controlled_by_their_errors() {
         let sizes: Vec<f64> = records.iter().map(|record| record.tau).collect();
         assert!(sizes.windows(2).any(|pair| pair[0] != pair[1]), "{sizes:?}");
         let energies: Vec<f64> = records.iter().filter_map(Record::willmore_energy).collect();
-        assert!(energies.windows(2).all(|pair| pair[1] < pair[0]), "{energies:?}");
+        assert!(
+            energies.windows(2).all(|pair| pair[1] < pair[0]),
+            "{energies:?}"
+        );
     }
 }
 
@@ -96,7 +102,10 @@ fn steps_of_own_parts_are_controlled_by_their_errors() {
 fn a_scheme_without_estimates_is_not_controlled_by_them() {
     let refused = Willmore::on(grid()).scheme(Euler::new).start(&egg());
     let error = refused.err().unwrap().to_string();
-    assert!(error.contains("euler") && error.contains("estimate"), "{error}");
+    assert!(
+        error.contains("euler") && error.contains("estimate"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -129,11 +138,14 @@ impl Observer<2> for After {
 /// The bits of the phase field after four steps in a folder, interrupted or not after two.
 fn four_steps(flow: impl Fn() -> Willmore<2>, folder: &Path, interrupted: bool) -> Vec<u64> {
     let run = |until: usize| {
-        let (mut store, mut run) = flow().until(Stop::Steps(4)).start_in(folder, &egg()).unwrap();
+        let mut kept = flow()
+            .until(Stop::Steps(4))
+            .start_in(folder, &egg())
+            .unwrap();
         let interrupt = Interrupt::never();
         let mut after = After(until, interrupt.clone());
-        run.advance(Some(&mut store), &mut [&mut after], &interrupt).unwrap();
-        run
+        kept.advance(&mut [&mut after], &interrupt).unwrap();
+        kept.run
     };
     if interrupted {
         assert_eq!(run(2).records().len(), 2);
@@ -151,10 +163,13 @@ fn runs_with_own_parts_go_on_to_the_same_bytes() {
         ("term", heavy),
         ("scheme", doubling),
         ("operator", allen_cahn),
-        ("term on bricks", || heavy().storage(Storage::Bricks).keep_volume()),
+        ("term on bricks", || {
+            heavy().storage(Storage::Bricks).keep_volume()
+        }),
     ];
     for (name, flow) in flows {
-        let [whole, parts] = ["whole", "parts"].map(|part| root.path().join(format!("{name} {part}")));
+        let [whole, parts] =
+            ["whole", "parts"].map(|part| root.path().join(format!("{name} {part}")));
         let same = four_steps(flow, &whole, false) == four_steps(flow, &parts, true);
         assert!(same, "{name}");
     }
@@ -163,9 +178,11 @@ fn runs_with_own_parts_go_on_to_the_same_bytes() {
 #[test]
 fn what_a_program_does_not_have_is_named() {
     let root = tempfile::tempdir().unwrap();
-    let (store, run) = heavy().start_in(root.path().join("run"), &egg()).unwrap();
-    drop((store, run));
+    drop(heavy().start_in(root.path().join("run"), &egg()).unwrap());
     let refused = Willmore::on(grid()).start_in(root.path().join("run"), &egg());
     let error = refused.err().unwrap().to_string();
-    assert!(error.contains("the term of the energy \"gravity\""), "{error}");
+    assert!(
+        error.contains("the term of the energy \"gravity\""),
+        "{error}"
+    );
 }
