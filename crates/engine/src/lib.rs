@@ -35,8 +35,8 @@
 //! shapes; [observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
 //! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
 //!
-//! Extensions have one place each: a step rule in [`StepRule`], a stop rule in [`Stop`], a method in [`Method`], a measure in
-//! [`Measure`], an observer behind [`Observer`].
+//! [`Run::step`] is the loop of a step: a [`Controller`] says the size, a [`Scheme`](solver::Scheme) makes a candidate, and the controller takes it or not.
+//! Parts of one's own are in [`Own`], [`Operator::own`], [`Measure::new`], and behind [`Observer`].
 //!
 //! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through as they are; functions that refuse something
 //! themselves say what.

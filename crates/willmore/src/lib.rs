@@ -49,3 +49,14 @@ pub mod prelude;
 
 pub use builder::{Error, Kept, Willmore};
 pub use {engine, fem, geometry, linearize, mean_curvature, model, operators, runs, solver};
+
+/// The programs of these documents are compiled and run.
+#[cfg(doctest)]
+mod documents {
+    #[doc = include_str!("../../../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../../docs/extending.md")]
+    struct Extending;
+    #[doc = include_str!("../../../docs/calibration.md")]
+    struct Calibration;
+}
