@@ -16,7 +16,7 @@ use crate::{Error, names};
 /// Not text, not any other format, and changed by programs that convert line ends.
 const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
 /// Bumped when a reader of the old format would misread the new one.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 /// Notes that are nested more deeply could not be read back.
 const DEEPEST: usize = 200;
 
@@ -121,7 +121,7 @@ pub(crate) fn kept(finished: bool) -> usize {
 /// | bytes | content |
 /// |---|---|
 /// | 8 | magic `8f 63 6b 70 74 0d 0a 1a` |
-/// | 4 | format version, little endian: 4 |
+/// | 4 | format version, little endian: 5 |
 /// | … | these three as CBOR (RFC 8949) |
 /// | 32 | SHA-256 of all bytes before |
 pub(crate) type Commit<'a> = (bool, Files, State<'a>);

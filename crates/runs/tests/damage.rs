@@ -312,7 +312,7 @@ fn other_versions_are_refused_with_both_values() {
         fs::write(&path, rehashed(&bytes)).unwrap();
         let message = RunDirectory::open(&run).unwrap_err().to_string();
         assert!(message.contains(&format!("version {version}")), "{message}");
-        assert!(message.contains("version 4") && message.contains("step-00000003"));
+        assert!(message.contains("version 5") && message.contains("step-00000003"));
     }
     // Before its first checkpoint, a run of version 1 has this alone.
     let old = folder.path().join("old");
