@@ -306,7 +306,7 @@ fn other_versions_are_refused_with_both_values() {
     run_to(&run, 5).unwrap();
     let path = run.join("checkpoints/step-00000003.ckpt");
     let mut bytes = fs::read(&path).unwrap();
-    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x04\0\0\0");
+    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x05\0\0\0");
     for version in [3, 7] {
         bytes[8] = version;
         fs::write(&path, rehashed(&bytes)).unwrap();
