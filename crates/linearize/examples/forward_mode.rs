@@ -1,7 +1,7 @@
 //! Forward mode for a function written in Burn: a directional derivative, a Hessian-vector product, and the Taylor test of both.
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use linearize::{Error, Extensions, Graph, Value};
+use burn_linearize::{Error, Extensions, Graph, Value};
 
 /// The sum of `log(1 + exp(x_i x_(i+1)))`.
 fn function(x: Tensor<1>) -> Tensor<1> {

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use burn::tensor::{DType, Device, Tensor, TensorData};
-//! use linearize::dual::{self, Dual};
+//! use burn_linearize::dual::{self, Dual};
 //!
 //! let device = Device::default();
 //! let tensor = |data: [f64; 2]| {

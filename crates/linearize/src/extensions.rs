@@ -20,11 +20,11 @@ use crate::tangent::{Builder, Tangents};
 /// `f⁽ᵏ⁺¹⁾(x) ⊙ ẋ`:
 ///
 /// ```
-/// use linearize::{Extensions, ScalarIr};
+/// use burn_linearize::{Extensions, ScalarIr};
 /// let mut extensions = Extensions::new();
-/// extensions.rule("pointwise", |operation: &linearize::CustomOpIr,
-///                               tangents: &[Option<linearize::TensorIr>],
-///                               build: &mut linearize::Builder| {
+/// extensions.rule("pointwise", |operation: &burn_linearize::CustomOpIr,
+///                               tangents: &[Option<burn_linearize::TensorIr>],
+///                               build: &mut burn_linearize::Builder| {
 ///     let Some(tangent) = &tangents[0] else { return Ok(vec![None]) };
 ///     let order = operation.scalars[0].elem::<u64>();
 ///     let mut derivative = operation.clone();

@@ -14,7 +14,7 @@ use burn::backend::ir::{
 use burn::tensor::DType;
 
 /// Identifier of fused elementwise operations.
-pub const ELEMENTWISE: &str = "linearize::elementwise";
+pub const ELEMENTWISE: &str = "burn_linearize::elementwise";
 
 /// An operation on entries, `left + right` and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

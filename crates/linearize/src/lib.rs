@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use burn::tensor::{DType, Device, Tensor, TensorData};
-//! use linearize::{Extensions, Graph};
+//! use burn_linearize::{Extensions, Graph};
 //!
 //! // Ginzburg-Landau energy on a periodic line of unit spacing:
 //! // E(u) = Σ ε/2 (uᵢ₊₁ − uᵢ)² + 1/(4ε) (1 − uᵢ²)²
@@ -19,7 +19,7 @@
 //!     slope.powi_scalar(2).sum() * (0.5 * eps) + well.powi_scalar(2).sum() * (0.25 / eps)
 //! }
 //!
-//! # fn main() -> Result<(), linearize::Error> {
+//! # fn main() -> Result<(), burn_linearize::Error> {
 //! let device = Device::default();
 //! let tensor = |data: [f64; 4]| {
 //!     Tensor::<1>::from_data(TensorData::from(data), (&device, DType::F64))
@@ -126,3 +126,8 @@ pub use replay::{Evaluation, Linearization};
 pub use tangent::{Builder, Tangents, multilinear};
 pub use trace::{Graph, Inputs};
 pub use value::Value;
+
+/// The program of the front page is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -7,7 +7,7 @@
 //! close to it are left out.
 //!
 //! ```
-//! use linearize::taylor::{remainder, halvings};
+//! use burn_linearize::taylor::{remainder, halvings};
 //!
 //! let steps = halvings(0.5, 12);
 //! let cos_at_one = |t: f64| (1.0 + t).cos();

@@ -27,7 +27,7 @@ type Symbol = FloatTensor<Capture>;
 type TrackedSymbol = FloatTensor<Tracked>;
 
 /// Identifier of the operation that makes every input known to the capture device.
-const INPUTS: &str = "linearize::inputs";
+const INPUTS: &str = "burn_linearize::inputs";
 
 /// What the traced function receives: symbols that stand for the inputs of the graph.
 ///

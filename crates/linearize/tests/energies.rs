@@ -9,9 +9,9 @@ use crate::common::{self, check, devices, distance, linearization, random, vec};
 use burn::tensor::module::conv2d;
 use burn::tensor::ops::ConvOptions;
 use burn::tensor::{Device, Tensor};
-use linearize::dual::{self, Dual};
-use linearize::taylor::{halvings, remainder};
-use linearize::{Extensions, Graph, Statistics, Value};
+use burn_linearize::dual::{self, Dual};
+use burn_linearize::taylor::{halvings, remainder};
+use burn_linearize::{Extensions, Graph, Statistics, Value};
 
 /// Periodic shift by one along an axis, by slicing and concatenating.
 fn shift<const D: usize>(u: Tensor<D>, axis: usize) -> Tensor<D> {

@@ -12,9 +12,9 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, FlexDevice, TensorMetadata, backend_extension};
 use burn::tensor::{Device, Tensor, TensorData};
 use burn_router::RouterClient;
-use linearize::dual::{self, Dual};
-use linearize::taylor::{halvings, remainder};
-use linearize::{
+use burn_linearize::dual::{self, Dual};
+use burn_linearize::taylor::{halvings, remainder};
+use burn_linearize::{
     Builder, CustomOpIr, Error, Extensions, Graph, OperationIr, ScalarIr, TensorIr, Value,
     multilinear,
 };

@@ -127,7 +127,7 @@ fn pointwise() {
 
 #[test]
 fn activations_have_full_precision_on_every_backend() {
-    use linearize::{Graph, taylor};
+    use burn_linearize::{Graph, taylor};
     type Scalar = fn(f64) -> f64;
     let sigmoid: Scalar = |x| 1.0 / (1.0 + (-x).exp());
     let silu: Scalar = |x| x / (1.0 + (-x).exp());
@@ -155,7 +155,7 @@ fn activations_have_full_precision_on_every_backend() {
             let error = distance(&at.gradients[0].to_vec(), &exact);
             assert!(error < 1e-14, "{name}");
         }
-        let gelu = |i: &linearize::Inputs| activation::gelu(i.variable::<2>(0)).sum();
+        let gelu = |i: &burn_linearize::Inputs| activation::gelu(i.variable::<2>(0)).sum();
         let graph = Graph::gradient(&[(&u).into()], &[], gelu).unwrap();
         let mut lin = linearization(&graph, &device);
         let at = lin.at(&[(&u).into()], &[]).unwrap();
@@ -407,7 +407,7 @@ fn products() {
 /// Without autodiff before it, a traced function contains other operations.
 #[test]
 fn jacobian_vector_products_of_traced_functions() {
-    use linearize::{Extensions, Graph};
+    use burn_linearize::{Extensions, Graph};
     type Map = (&'static str, fn(Tensor<2>) -> Tensor<2>);
     let maps: &[Map] = &[
         ("softmax", |u| activation::softmax(u, 1)),
@@ -454,7 +454,7 @@ fn jacobian_vector_products_of_traced_functions() {
 /// single precision; a traced one is not.
 #[test]
 fn division_by_a_number_keeps_double_precision() {
-    use linearize::{Graph, dual};
+    use burn_linearize::{Graph, dual};
     for device in devices() {
         let u: Tensor<2> = random(&device, [3, 4], 61, 0.2, 0.8);
         let energy = |u: Tensor<2>| (u.exp() / 1.7).sum();

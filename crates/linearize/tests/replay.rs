@@ -2,7 +2,7 @@
 
 use crate::common::{self, devices, distance, linearization, random, vec};
 use burn::tensor::{DType, Device, Distribution, Int, Tensor, TensorData};
-use linearize::{Error, Extensions, Graph, Linearization, Value};
+use burn_linearize::{Error, Extensions, Graph, Linearization, Value};
 
 /// `Σ c (u − f)² + u⁴`
 fn graph(u: &Tensor<2>, f: &Tensor<2>, c: &Tensor<1>) -> Graph {
@@ -362,7 +362,7 @@ fn linearizations_run_on_several_threads_at_once() {
     fn is_shared<T: Send + Sync>() {}
     is_send::<Linearization>();
     is_shared::<Graph>();
-    is_shared::<linearize::Program>();
+    is_shared::<burn_linearize::Program>();
     is_shared::<Extensions>();
     for device in devices() {
         let work = |seed: u64| {

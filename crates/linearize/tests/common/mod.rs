@@ -1,6 +1,6 @@
 //! What the tests share: data, devices, and an oracle that knows nothing of this crate.
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use linearize::{Extensions, Graph, Linearization, Value, dual, taylor};
+use burn_linearize::{Extensions, Graph, Linearization, Value, dual, taylor};
 
 /// Every CPU backend compiled in.
 pub fn devices() -> Vec<Device> {
