@@ -155,7 +155,7 @@ impl<const D: usize> Run<D> {
             if self.steps() >= last {
                 return None;
             }
-            self.step().map(|record| record.cloned()).transpose()
+            self.step().map(Option::<&Record>::cloned).transpose()
         })
     }
 

@@ -11,13 +11,13 @@ use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, Flex, FlexDevice, TensorMetadata, backend_extension};
 use burn::tensor::{Device, Tensor, TensorData};
-use burn_router::RouterClient;
 use burn_linearize::dual::{self, Dual};
 use burn_linearize::taylor::{halvings, remainder};
 use burn_linearize::{
     Builder, CustomOpIr, Error, Extensions, Graph, OperationIr, ScalarIr, TensorIr, Value,
     multilinear,
 };
+use burn_router::RouterClient;
 
 #[backend_extension(Flex, Capture, Autodiff)]
 trait Blur: Backend {

@@ -173,7 +173,7 @@ fn an_explicit_step_has_the_factors_of_its_profile() {
         let ratio = found.factors.speed() / found.displacement.powi(2);
         assert!((found.alignment - 1.0).abs() < 1e-4, "{found:?}");
         assert!((ratio - 1.0).abs() < 3e-3, "{found:?}");
-        assert!((found.displacement - 1.0).abs() < 2e-2, "{found:?}");
+        assert!((found.displacement - 1.0).abs() < 3e-2, "{found:?}");
         assert!((found.factors.energy - 1.0).abs() < 0.1, "{found:?}");
         assert!(found.spontaneous_curvature.abs() < 1e-4, "{found:?}");
     }

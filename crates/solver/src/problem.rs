@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::{Field, Grid, NodeSet, Nodes, PhaseField, Stored, require};
+use geometry::{Bricks, Field, Grid, NodeSet, Nodes, PhaseField, Stored, require};
 use operators::ComputeDevice;
 
 use crate::{
@@ -164,14 +164,32 @@ impl<const D: usize> Problem<D> {
     /// records are then this energy.
     ///
     /// # Errors
-    /// [`Error::Geometry`] unless the response is positive.
+    /// [`Error::Geometry`] unless the response is positive; what the densities and shifts of the terms raise.
     pub fn set_energy(&mut self, terms: EnergyTerms<D>, response: f64) -> Result<(), Error> {
-        self.response = geometry::positive("response", response)?;
+        let response = geometry::positive("response", response)?;
+        self.check_terms(&terms)?;
+        self.response = response;
         self.terms.clone_from(&terms);
         if let Some(half) = self.half.take() {
             let mut half = Arc::unwrap_or_clone(half);
             half.set_energy(terms, response)?;
             self.half = Some(Arc::new(half));
+        }
+        Ok(())
+    }
+
+    /// Refuses terms that do not fit: on one brick, if the grid has bricks.
+    fn check_terms(&self, terms: &EnergyTerms<D>) -> Result<(), Error> {
+        let first = |place: [usize; D]| place == [0; D];
+        let nodes = match Bricks::new(self.grid.cells(), SMALLEST, first, |_| false) {
+            Ok(brick) => Nodes::on_bricks(self.grid, Arc::new(brick)),
+            Err(_) => self.grid.into(),
+        };
+        let domain = self.domain(&nodes);
+        let u = domain.sample(|_| 0.0);
+        for term in terms {
+            term.density(&u, &domain)?;
+            term.shift(&u, &domain)?;
         }
         Ok(())
     }

@@ -19,7 +19,8 @@ use crate::displacement::{
 use crate::movement::{Minimizations, Minimum, Movement};
 use crate::record::At;
 use crate::{
-    Candidate, DeviceField, Error, Memory, Problem, Scheme, Start, StartKind, State, StepSize,
+    Candidate, DeviceField, Error, Memory, Problem, Scheme, Start, StartKind, State, StepRecord,
+    StepSize,
 };
 
 /// `gamma = 1 - 1/sqrt 2`: the size of a stage over that of the step.
@@ -82,6 +83,54 @@ impl<const D: usize> SecondOrder<D> {
     }
 }
 
+impl<const D: usize> SecondOrder<D> {
+    /// Both stages of a step from a state that is on the bricks near its interface.
+    fn stages(
+        &mut self,
+        problem: &Problem<D>,
+        from: &State<D>,
+        size: StepSize,
+    ) -> Result<Stages<D>, Error> {
+        let targets = problem.held.at(from.progress + size.part());
+        let (before, tau) = (from.field.stored()?, GAMMA * size.tau);
+        let rate = from.memory.fields.get(RATE);
+        let rate = rate.map(DeviceField::stored).transpose()?;
+
+        let anticipated = anticipated(rate.as_ref(), &before, tau);
+        let stage = Stage {
+            anchor: &before,
+            expected: &anticipated,
+            start: &before.zip_map(&limited(&anticipated), displaced),
+            tau,
+            // Targets are approached evenly, so that both stages go the same way to them.
+            targets: targets.after(GAMMA, &before, problem.params.eps)?,
+        };
+        let first = self.minimum(problem, from, &stage)?;
+        let middle = first.u.stored()?;
+
+        let moved = middle.zip_map(&before, displacement);
+        let further = moved.map(|y| FURTHER * y);
+        let anchor = anchor(&before, &middle, &further);
+        let stage = Stage {
+            anchor: &anchor,
+            expected: &moved,
+            start: &middle.zip_map(&further, displaced),
+            tau,
+            targets,
+        };
+        let second = self.minimum(problem, from, &stage)?;
+        let after = second.u.stored()?;
+
+        let of_stage = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / tau);
+        Ok(Stages {
+            rates: [of_stage(&middle, &before), of_stage(&after, &anchor)],
+            rate_before: rate,
+            states: [before, middle, after],
+            minima: [first, second],
+        })
+    }
+}
+
 impl<const D: usize> Scheme<D> for SecondOrder<D> {
     fn step(
         &mut self,
@@ -89,73 +138,17 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         from: &State<D>,
         size: StepSize,
     ) -> Result<Candidate<D>, Error> {
-        let (clock, eps) = (Instant::now(), problem.params.eps);
+        let clock = Instant::now();
         let from = problem.followed(from)?;
-        let targets = problem.held.at(from.progress + size.part());
-        let before = from.field.stored()?;
-        let tau = GAMMA * size.tau;
-        let rate = from.memory.fields.get(RATE);
-        let rate = rate.map(|rate| rate.stored()).transpose()?;
-
-        let anticipated = anticipated(rate.as_ref(), &before, tau);
-        let first = self.minimum(
-            problem,
-            &from,
-            &Stage {
-                anchor: &before,
-                expected: &anticipated,
-                start: &before.zip_map(&limited(&anticipated), displaced),
-                tau,
-                // Targets are approached evenly, so that both stages go the same way to them.
-                targets: targets.after(GAMMA, &before, eps)?,
-            },
-        )?;
-        let middle = first.u.stored()?;
-
-        let moved = middle.zip_map(&before, displacement);
-        let further = moved.map(|y| FURTHER * y);
-        let anchor = anchor(&before, &middle, &further);
-        let second = self.minimum(
-            problem,
-            &from,
-            &Stage {
-                anchor: &anchor,
-                expected: &moved,
-                start: &middle.zip_map(&further, displaced),
-                tau,
-                targets,
-            },
-        )?;
-        let after = second.u.stored()?;
-
-        let of_stage = |to: &Stored<D>, from| to.zip_map(from, |u, v| displacement(u, v) / tau);
-        let rates = [of_stage(&middle, &before), of_stage(&after, &anchor)];
-        let made = Made {
-            states: [&before, &middle, &after],
-            start: rate.as_ref().filter(|_| from.step >= WITHOUT),
-            rates: &rates,
-            tau: size.tau,
-        };
-        let kind = match &rate {
-            Some(_) => StartKind::Extrapolated,
-            None => StartKind::Rest,
-        };
-        let at = At { from: &from, size };
-        let mut record = second.record(&at, Start { kind, hvp: 0.0 }, clock);
-        record.newton = second.newton.after(&first.newton);
-        record.times = first.times + second.times;
-        record.estimates = Some(made.estimates(eps));
-        // At u_k nothing has moved, and the energy is that of the curvature.
-        let at_rest = problem.energy_scale() * first.newton.energy_before / (2.0 * tau);
-        record.energy_before = 2.0 * size.tau * at_rest;
-        record.energy = 2.0 * size.tau * second.willmore_energy;
+        let stages = self.stages(problem, &from, size)?;
+        let made = stages.record(problem, &At { from: &from, size }, clock);
+        let ([_, rate], [_, second]) = (stages.rates, stages.minima);
         let mut memory = Memory::default();
-        let [_, last] = &rates;
-        let last = DeviceField::upload(last, &problem.device);
-        memory.fields.insert(RATE.to_owned(), last);
+        let rate = DeviceField::upload(&rate, &problem.device);
+        memory.fields.insert(RATE.to_owned(), rate);
         Ok(Candidate {
-            state: at.after(second.u, memory),
-            made: Some(record),
+            state: At { from: &from, size }.after(second.u, memory),
+            made: Some(made),
         })
     }
 
@@ -201,29 +194,50 @@ fn anticipated<const D: usize>(rate: Option<&Stored<D>>, now: &Stored<D>, tau: f
 /// Steps that have no estimate.
 const WITHOUT: usize = 3;
 
-/// A step that was made.
-struct Made<'a, const D: usize> {
+/// Both stages of a step.
+struct Stages<const D: usize> {
     /// `u_k`, `U` and `u_{k+1}`.
-    states: [&'a Stored<D>; 3],
-    /// The rate at its start, that of the second stage of the step before, if it means anything.
-    start: Option<&'a Stored<D>>,
+    states: [Stored<D>; 3],
+    /// What the minimizations ended in.
+    minima: [Minimum<D>; 2],
+    /// The rate of the second stage of the step before, if that was of second order.
+    rate_before: Option<Stored<D>>,
     /// The rates of both stages.
-    rates: &'a [Stored<D>; 2],
-    tau: f64,
+    rates: [Stored<D>; 2],
 }
 
-impl<const D: usize> Made<'_, D> {
+impl<const D: usize> Stages<D> {
+    /// What the step says of itself.
+    fn record(&self, problem: &Problem<D>, at: &At<'_, D>, clock: Instant) -> StepRecord {
+        let ([first, second], tau) = (&self.minima, at.size.tau);
+        let kind = match self.rate_before {
+            Some(_) => StartKind::Extrapolated,
+            None => StartKind::Rest,
+        };
+        // At u_k nothing has moved, and the energy is that of the curvature.
+        let at_rest = problem.energy_scale() * first.newton.energy_before / (2.0 * GAMMA * tau);
+        StepRecord {
+            newton: second.newton.after(&first.newton),
+            times: first.times + second.times,
+            estimates: Some(self.estimates(at, problem.params.eps)),
+            energy_before: 2.0 * tau * at_rest,
+            energy: 2.0 * tau * second.willmore_energy,
+            ..second.record(at, Start { kind, hvp: 0.0 }, clock)
+        }
+    }
+
     /// The lengths that the step is judged by.
     ///
     /// The rates at the times `0`, `gamma tau` and `tau` of the step are `F_0`, that of the second stage of the step before, `F_1` and `F_2`.
     /// The quadrature with weights `b` that is exact for quadratic rates differs from the step's own, `1 - gamma` and `gamma`, by the local error:
     /// `tau |b_0 F_0 + (b_1 - 1 + gamma) F_1 + (b_2 - gamma) F_2|`.
-    fn estimates(&self, eps: f64) -> StepEstimates {
+    fn estimates(&self, at: &At<'_, D>, eps: f64) -> StepEstimates {
         const FIRST: f64 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
         const SECOND: f64 = (2.0 - 3.0 * GAMMA) / (6.0 * (1.0 - GAMMA));
         /// Interface that is so many widths from any other has none to which it could have moved.
         const AWAY: f64 = 2.0;
-        let ([before, middle, after], [first, second]) = (self.states, self.rates);
+        let ([before, middle, after], [first, second]) = (&self.states, &self.rates);
+        let start = self.rate_before.as_ref();
         let unit = 4.0 * eps / 3.0;
         let between =
             |to: &Stored<D>, from| unit * largest(&to.zip_map(from, displacement), middle);
@@ -233,12 +247,12 @@ impl<const D: usize> Made<'_, D> {
             if widths > AWAY { widths * eps } else { 0.0 }
         };
         let [gone, new] = [before, after].map(away);
-        let error = self.start.map(|start| {
+        let error = start.filter(|_| at.from.step >= WITHOUT).map(|start| {
             let stages = first.zip_map(second, |first, second| {
                 (FIRST - 1.0 + GAMMA) * first + (SECOND - GAMMA) * second
             });
             let error = stages.zip_map(start, |stages, start| {
-                self.tau * (stages + (1.0 - FIRST - SECOND) * start)
+                at.size.tau * (stages + (1.0 - FIRST - SECOND) * start)
             });
             unit * largest(&error, middle)
         });

@@ -50,6 +50,9 @@ impl<const D: usize> Controller<D> for ByNewton {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let first = 0.25 * grid.spacing().powi(4);

@@ -13,6 +13,9 @@ pub fn reach() -> Measure<2> {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)

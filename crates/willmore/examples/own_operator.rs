@@ -48,7 +48,10 @@ impl MeanCurvatureStep<2> for AllenCahn {
     }
 }
 
-/// A flow with the step inside, from a disc: `eps = 3 h`, and a step that is short enough to be explicit.
+/// Flows with the step inside: `eps = 3 h`, and a step that is short enough to be explicit.
+///
+/// # Errors
+/// If no device is compiled in.
 pub fn flow() -> Result<Willmore<2>, Box<dyn std::error::Error>> {
     let grid = Grid::per_unit(128, 1.0)?;
     let inner = 0.2 * grid.spacing().powi(2);
@@ -59,6 +62,9 @@ pub fn flow() -> Result<Willmore<2>, Box<dyn std::error::Error>> {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut flow = flow()?
         .until(Stop::Time(2e-4))

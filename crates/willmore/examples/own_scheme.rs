@@ -58,6 +58,9 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)

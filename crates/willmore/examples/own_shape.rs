@@ -29,6 +29,9 @@ impl SignedDistance<2> for Egg {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let egg = Egg {
         radii: [0.25, 0.12],

@@ -33,6 +33,9 @@ impl StopRule<2> for Round {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the flow.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)

@@ -47,8 +47,9 @@ pub fn calibrate<const D: usize>(
             Some(SmallerBox { step, cells }) => (&**step, *cells),
             None => (step, scales.cells),
         };
-        // Written so that NaN does not fit.
-        if !(needed(normal, APART) <= cells as f64) {
+        // NaN does not.
+        let fits = needed(normal, APART) <= cells as f64;
+        if !fits {
             continue;
         }
         let mut bench = Bench {
@@ -84,8 +85,8 @@ fn smaller_box<const D: usize>(
     scales: &StepScales,
     ample: f64,
 ) -> Result<Option<SmallerBox<D>>, Error> {
-    // Written so that NaN is refused.
-    if !(ample < scales.cells as f64) {
+    let is_smaller = ample < scales.cells as f64;
+    if !is_smaller {
         return Ok(None);
     }
     let cells = ample as usize;
@@ -236,16 +237,21 @@ impl<const D: usize> Bench<'_, D> {
         let straight = planes.means(&self.derivative.product(&lifted)?);
         let mut sum = Col::<f64>::zeros(planes.count());
         for waves in planes.waves((2.0 * self.time_step).sqrt()) {
-            let mut response = |i: usize| -> Result<Col<f64>, Error> {
-                let wave = &waves.0[i];
+            for (wave, weight) in waves.0.iter().zip(Waves::TO_ZERO) {
+                if !planes.tell(wave) {
+                    return Err(Error::BoxTooSmall {
+                        cells: planes.count(),
+                        eps: self.eps,
+                        least: planes.count() + 1,
+                    });
+                }
                 let mut direction = lifted.clone();
                 wave.multiply(&mut direction);
                 let mut image = self.derivative.product(&direction)?;
                 wave.multiply(&mut image);
                 let change = planes.means(&image) * faer::Scale(2.0) - &straight;
-                Ok(change * faer::Scale(1.0 / wave.square))
-            };
-            sum += Waves::extrapolated([response(0)?, response(1)?, response(2)?]);
+                sum += change * faer::Scale(weight / wave.square);
+            }
         }
         Ok(sum * faer::Scale(1.0 / (D - 1) as f64))
     }
@@ -279,8 +285,9 @@ impl Signed {
         let part = |x: &Col<f64>| Col::from_fn(half.len(), |m| sign * x[half.start + m]);
         let (optimal_slope, psi, image) = (part(&pair.slope), part(&self.psi), part(&self.image));
         let eigenvalue = dot(&psi, &image) / dot(&psi, &psi);
-        // Written so that NaN is refused.
-        if !((eigenvalue - 1.0).abs() <= OFF) {
+        // NaN is not.
+        let near = (eigenvalue - 1.0).abs() <= OFF;
+        if !near {
             return Err(Error::Calibration {
                 reason: LOST,
                 eigenvalue,
