@@ -48,7 +48,7 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
         Ok(Candidate { state, made })
     }
 
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "step doubling"
     }
 
