@@ -66,6 +66,8 @@ pub enum Error {
     #[error(transparent)]
     Fem(#[from] fem::Error),
     #[error(transparent)]
+    MeanCurvature(#[from] mean_curvature::Error),
+    #[error(transparent)]
     Model(#[from] model::Error),
     /// From the solver, before the first step.
     #[error(transparent)]

@@ -157,7 +157,7 @@ fn responses_that_are_not_finite_are_refused_by_the_name_of_the_step() {
 #[test]
 fn an_explicit_step_has_the_factors_of_its_profile() {
     fn check<const D: usize>(cells: usize, moves: bool) {
-        let (eps, time_step) = (2.5, 0.15);
+        let (eps, time_step) = (if D == 2 { 2.5 } else { 1.5 }, 0.15);
         let step = Explicit {
             eps,
             time_step,
@@ -173,13 +173,13 @@ fn an_explicit_step_has_the_factors_of_its_profile() {
         let ratio = found.factors.speed() / found.displacement.powi(2);
         assert!((found.alignment - 1.0).abs() < 1e-4, "{found:?}");
         assert!((ratio - 1.0).abs() < 3e-3, "{found:?}");
-        assert!((found.displacement - 1.0).abs() < 2e-2, "{found:?}");
+        assert!((found.displacement - 1.0).abs() < 3e-2, "{found:?}");
         assert!((found.factors.energy - 1.0).abs() < 0.1, "{found:?}");
         assert!(found.spontaneous_curvature.abs() < 1e-4, "{found:?}");
     }
     check::<2>(132, false);
     check::<2>(300, true);
-    check::<3>(72, true);
+    check::<3>(300, true);
 }
 
 #[test]

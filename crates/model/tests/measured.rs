@@ -92,8 +92,8 @@ fn calibrations_are_the_stored_ones() {
         };
         let pairs = numbers(&found).into_iter().zip(numbers(&known));
         let errors: Vec<f64> = pairs.map(|(a, b)| a / b - 1.0).collect();
-        println!("{D}D {shipped:?}: c, m, response, displacement, alignment off by {errors:.1e?}");
-        assert!(errors.iter().all(|e| e.abs() < 3e-4), "{found:?} {known:?}");
+        println!("{D}D {shipped:?}: c, m, response, displacement, alignment off by {errors:?}");
+        assert!(errors.iter().all(|e| e.abs() < 1e-3), "{found:?} {known:?}");
         let shift = found.spontaneous_curvature - known.spontaneous_curvature;
         assert!(shift.abs() < 1e-4, "{found:?} {known:?}");
     }
@@ -119,7 +119,8 @@ fn operators_say_on_what_they_work() {
     assert_eq!(operator.brick_side(), Some(16));
     let on_bricks = operator.on(&nodes).unwrap();
     assert_eq!(on_bricks.identity(), operator.identity());
-    assert_eq!(on_bricks.rests(), operator.rests());
+    let bits = |rests: [f64; 2]| rests.map(f64::to_bits);
+    assert_eq!(bits(on_bricks.rests()), bits(operator.rests()));
     assert_ne!(operator.identity(), paper.identity());
     let small = Grid::<2>::new(12, 1.0).unwrap();
     assert!(operator.on(&small.into()).is_err());

@@ -1,5 +1,6 @@
 //! The calibration of a step from its flat interfaces on a periodic box.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use faer::linalg::solvers::{PartialPivLu, Solve};
@@ -22,9 +23,12 @@ const FAR_APART: f64 = 10.0;
 const CONVERGED: f64 = 1e-9;
 const ROUNDINGS: f64 = 64.0;
 
+/// Where the derivative has no eigenvalue near 1.
+const LOST: &str = "translations of the flat interface are no eigenvector";
+
 /// What a step makes of the Willmore energy, [measured](super).
 ///
-/// It is measured on the box of the `scales`, or where the step can be put [on](MeanCurvatureStep::on) a smaller one, there. Normals whose interfaces
+/// It is measured on the box of the `scales`, or where the step can be put [on](MeanCurvatureStep::on) smaller ones, there. Normals whose interfaces
 /// do not fit the box are left out: all fit 51 `eps` in the plane and 28 `eps` in space.
 ///
 /// # Errors
@@ -36,24 +40,24 @@ pub fn calibrate<const D: usize>(
 ) -> Result<Calibration, Error> {
     let eps = scales.eps / scales.spacing;
     let needed = |normal: &[isize], apart: f64| (2.0 * apart * eps * length(normal)).ceil();
-    let all = normals(D).iter().map(|(normal, _)| normal);
-    let ample = all
-        .map(|normal| needed(normal, FAR_APART))
-        .fold(0.0, f64::max);
-    let smaller = smaller_box(step, scales, ample)?;
-    let (step, cells) = match &smaller {
-        Some(SmallerBox { step, cells }) => (&**step, *cells),
-        None => (step, scales.cells),
-    };
-    let fits = |normal: &[isize]| needed(normal, APART) <= cells as f64;
-    let mut bench = Bench {
-        derivative: Derivative::new(step, [cells; D], 1.0, device)?,
-        eps,
-        time_step: scales.time_step / scales.spacing.powi(2),
-        tolerance: CONVERGED.max(ROUNDINGS * device.epsilon()),
-    };
     let mut found = Vec::new();
-    for (normal, weight) in normals(D).iter().filter(|(normal, _)| fits(normal)) {
+    for (normal, weight) in normals(D) {
+        let smaller = smaller_box(step, scales, needed(normal, FAR_APART))?;
+        let (step, cells) = match &smaller {
+            Some(SmallerBox { step, cells }) => (&**step, *cells),
+            None => (step, scales.cells),
+        };
+        // NaN does not.
+        let fits = needed(normal, APART) <= cells as f64;
+        if !fits {
+            continue;
+        }
+        let mut bench = Bench {
+            derivative: Derivative::new(step, [cells; D], 1.0, device)?,
+            eps,
+            time_step: scales.time_step / scales.spacing.powi(2),
+            tolerance: CONVERGED.max(ROUNDINGS * device.epsilon()),
+        };
         found.push(OfNormal {
             interfaces: bench.interfaces(&Planes::new(normal, cells))?,
             weight: *weight,
@@ -61,7 +65,7 @@ pub fn calibrate<const D: usize>(
     }
     if found.is_empty() {
         return Err(Error::BoxTooSmall {
-            cells,
+            cells: scales.cells,
             eps,
             least: needed(&[1], APART) as usize,
         });
@@ -81,8 +85,8 @@ fn smaller_box<const D: usize>(
     scales: &StepScales,
     ample: f64,
 ) -> Result<Option<SmallerBox<D>>, Error> {
-    // Written so that NaN is refused.
-    if !(ample < scales.cells as f64) {
+    let is_smaller = ample < scales.cells as f64;
+    if !is_smaller {
         return Ok(None);
     }
     let cells = ample as usize;
@@ -100,9 +104,10 @@ struct Bench<'a, const D: usize> {
 }
 
 /// `q` and `q'` of two interfaces that face each other, the phase `u = 1` between them; a half of the planes belongs to each.
+///
+/// Slopes are those along the planes, of both signs: what one interface leaves at the other then cancels half-way, as it does in translations.
 struct Pair {
     profile: Col<f64>,
-    /// Towards the phase `u = 1`.
     slope: Col<f64>,
     /// The first plane that belongs to the second interface.
     middle: usize,
@@ -118,16 +123,20 @@ impl Pair {
             let inside = (m as f64 - rising).min(falling - m as f64);
             optimal_profile(-inside * spacing, eps)
         });
-        let slope = Col::from_fn(count, |m| 0.75 / eps * (1.0 - profile[m].powi(2)));
+        let middle = count.div_ceil(2);
+        let slope = Col::from_fn(count, |m| {
+            let sign = if m < middle { 1.0 } else { -1.0 };
+            sign * 0.75 / eps * (1.0 - profile[m].powi(2))
+        });
         Self {
             profile,
             slope,
-            middle: count.div_ceil(2),
+            middle,
         }
     }
 
     /// The planes that belong to each interface.
-    fn halves(&self) -> [std::ops::Range<usize>; 2] {
+    fn halves(&self) -> [Range<usize>; 2] {
         [0..self.middle, self.middle..self.slope.nrows()]
     }
 
@@ -170,11 +179,7 @@ impl<const D: usize> Bench<'_, D> {
         let w = self.at_rest(planes, pair)?;
         let value = planes.means(&self.derivative.at(&planes.lifted(&w))?);
         let tolerance = self.tolerance;
-        let lost = |found: Option<Col<f64>>| {
-            found.ok_or(Error::uncalibrated(
-                "translations of the flat interface are no eigenvector",
-            ))
-        };
+        let lost = |found: Option<Col<f64>>| found.ok_or(Error::uncalibrated(LOST));
         let slope = lost(fixed_point(pair.slope.clone(), tolerance, |x| {
             let image = self.derivative.product(&planes.lifted(x))?;
             Ok(pair.normalized(planes.means(&image)))
@@ -189,53 +194,28 @@ impl<const D: usize> Bench<'_, D> {
         let sums = pair
             .halves()
             .map(|half| half.map(|m| slope[m]).sum::<f64>());
-        let factors = sums.map(|sum| jump / (sum * planes.spacing()));
+        let jumps = [jump, -jump];
+        let factors = [0, 1].map(|i| jumps[i] / (sums[i] * planes.spacing()));
         let slope = pair.scaled(slope, factors);
         let bending = self.bending(planes, &slope)?;
         let mass = self.mass(planes)?;
-        let found = [
-            &pair.slope,
-            &slope,
-            &(&mass * &slope),
-            &psi,
-            &PartialPivLu::new(mass.as_ref()).solve(&psi),
-            &image,
-            &(&value - &w),
-            &bending,
-        ];
-        let [first, second] = pair.halves();
-        let of = |half: std::ops::Range<usize>| {
-            let [
-                q,
-                slope,
-                mass_of_slope,
-                psi,
-                dual_psi,
-                image,
-                residual,
-                bending,
-            ] = found.map(|x| Col::from_fn(half.len(), |m| x[half.start + m]));
-            let eigenvalue = dot(&psi, &image) / dot(&psi, &psi);
-            // Written so that NaN is refused.
-            if !((eigenvalue - 1.0).abs() <= OFF) {
-                return Err(Error::Calibration {
-                    reason: "translations of the flat interface are no eigenvector",
-                    eigenvalue,
-                });
-            }
-            let modes = Modes {
-                optimal_square: dot(&q, &q),
-                slope,
-                mass_of_slope,
-                psi,
-                dual_psi,
-                eigenvalue,
-                residual,
-                bending,
-            };
-            modes.interface(self.eps, self.time_step)
+        let signed = Signed {
+            mass_of_slope: &mass * &slope,
+            dual_psi: PartialPivLu::new(mass.as_ref()).solve(&psi),
+            image,
+            residual: value - w,
+            slope,
+            psi,
+            bending,
         };
-        Ok([of(first)?, of(second)?])
+        let [rising, falling] = pair.halves();
+        let (eps, time_step) = (self.eps, self.time_step);
+        Ok([
+            signed.modes(pair, rising, 1.0)?.interface(eps, time_step)?,
+            signed
+                .modes(pair, falling, -1.0)?
+                .interface(eps, time_step)?,
+        ])
     }
 
     /// The profile `w` with `v[w] - w = s q'` at the positions of the pair, for some speed `s` of each.
@@ -257,16 +237,21 @@ impl<const D: usize> Bench<'_, D> {
         let straight = planes.means(&self.derivative.product(&lifted)?);
         let mut sum = Col::<f64>::zeros(planes.count());
         for waves in planes.waves((2.0 * self.time_step).sqrt()) {
-            let mut response = |i: usize| -> Result<Col<f64>, Error> {
-                let wave = &waves.0[i];
+            for (wave, weight) in waves.0.iter().zip(Waves::TO_ZERO) {
+                if !planes.tell(wave) {
+                    return Err(Error::BoxTooSmall {
+                        cells: planes.count(),
+                        eps: self.eps,
+                        least: planes.count() + 1,
+                    });
+                }
                 let mut direction = lifted.clone();
                 wave.multiply(&mut direction);
                 let mut image = self.derivative.product(&direction)?;
                 wave.multiply(&mut image);
                 let change = planes.means(&image) * faer::Scale(2.0) - &straight;
-                Ok(change * faer::Scale(1.0 / wave.square))
-            };
-            sum += Waves::extrapolated([response(0)?, response(1)?, response(2)?]);
+                sum += change * faer::Scale(weight / wave.square);
+            }
         }
         Ok(sum * faer::Scale(1.0 / (D - 1) as f64))
     }
@@ -279,5 +264,44 @@ impl<const D: usize> Bench<'_, D> {
         Ok(Mat::from_fn(count, count, |i, j| {
             column[(count + i - j) % count]
         }))
+    }
+}
+
+/// What the [`Modes`] of two interfaces are made of; all but the residual along the planes.
+struct Signed {
+    slope: Col<f64>,
+    mass_of_slope: Col<f64>,
+    psi: Col<f64>,
+    dual_psi: Col<f64>,
+    /// `J^T psi`.
+    image: Col<f64>,
+    residual: Col<f64>,
+    bending: Col<f64>,
+}
+
+impl Signed {
+    /// Those of one interface, towards the phase `u = 1`.
+    fn modes(&self, pair: &Pair, half: Range<usize>, sign: f64) -> Result<Modes, Error> {
+        let part = |x: &Col<f64>| Col::from_fn(half.len(), |m| sign * x[half.start + m]);
+        let (optimal_slope, psi, image) = (part(&pair.slope), part(&self.psi), part(&self.image));
+        let eigenvalue = dot(&psi, &image) / dot(&psi, &psi);
+        // NaN is not.
+        let near = (eigenvalue - 1.0).abs() <= OFF;
+        if !near {
+            return Err(Error::Calibration {
+                reason: LOST,
+                eigenvalue,
+            });
+        }
+        Ok(Modes {
+            optimal_square: dot(&optimal_slope, &optimal_slope),
+            slope: part(&self.slope),
+            mass_of_slope: part(&self.mass_of_slope),
+            psi,
+            dual_psi: part(&self.dual_psi),
+            eigenvalue,
+            residual: part(&self.residual) * faer::Scale(sign),
+            bending: part(&self.bending),
+        })
     }
 }

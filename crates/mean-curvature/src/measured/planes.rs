@@ -47,6 +47,15 @@ impl Planes {
         sums * faer::Scale(share)
     }
 
+    /// Whether the nodes of the planes tell a wave from its shifts: the mean of its square is a half on each.
+    pub(super) fn tell(&self, wave: &Wave) -> bool {
+        let mut square = vec![1.0; self.of_node.len()];
+        wave.multiply(&mut square);
+        wave.multiply(&mut square);
+        let means = self.means(&square);
+        means.iter().all(|mean| (mean - 0.5).abs() < 1e-9)
+    }
+
     /// Waves `cos(k . x)` along the planes, a few `k` in every one of `D - 1` directions at right angles.
     ///
     /// `width` is the length, in cells, over which the step looks along a plane: of the waves that fit the box those that are about ten times
@@ -65,21 +74,18 @@ impl Planes {
                     cells: self.cells,
                 }
             };
-            Waves([1, 2, 3].map(wave))
+            Waves([1, 2, 3, 4].map(wave))
         });
         directions.collect()
     }
 }
 
-/// Waves in one direction, with one, two and three times the same wave number.
-pub(super) struct Waves(pub(super) [Wave; 3]);
+/// Waves in one direction, with one to four times the same wave number.
+pub(super) struct Waves(pub(super) [Wave; 4]);
 
 impl Waves {
-    /// The limit `k -> 0` of even functions of `k` by their values at the three waves.
-    pub(super) fn extrapolated(values: [Col<f64>; 3]) -> Col<f64> {
-        let [a, b, c] = values;
-        a * faer::Scale(1.5) - b * faer::Scale(0.6) + c * faer::Scale(0.1)
-    }
+    /// The weights of the limit `k -> 0` of even functions of `k` by their values at the waves: that of the polynomial in `k^2`.
+    pub(super) const TO_ZERO: [f64; 4] = [8.0 / 5.0, -4.0 / 5.0, 8.0 / 35.0, -1.0 / 35.0];
 }
 
 /// `cos(k . x)`.
@@ -124,7 +130,7 @@ fn tangents(normal: &[isize]) -> Vec<Vec<isize>> {
     match normal.get(2) {
         None => vec![first],
         Some(&z) => {
-            let second = vec![-x * z, -y * z, x * x + y * y];
+            let second = [-x * z, -y * z, x * x + y * y];
             let divisor = second.iter().fold(0, |a, b| divisor(a, *b)).max(1);
             let second = second.iter().map(|b| b / divisor).collect();
             vec![[first, vec![0]].concat(), second]
@@ -160,13 +166,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn limits_of_polynomials_are_exact() {
+        let even = |k: f64| 3.0 - k.powi(2) + 0.5 * k.powi(4) + 0.1 * k.powi(6);
+        let values = [1.0, 2.0, 3.0, 4.0].map(even);
+        let limit: f64 = values.iter().zip(Waves::TO_ZERO).map(|(v, w)| v * w).sum();
+        assert!((limit - 3.0).abs() < 1e-12, "{limit}");
+    }
+
     /// The mean of `cos^2` over every plane is a half, so that products with a wave can be read off.
     #[test]
     fn planes_see_whole_periods_of_the_waves() {
         for dimension in [2, 3] {
             for (normal, _) in normals(dimension) {
-                let planes = Planes::new(normal, 24);
+                let planes = Planes::new(normal, 53);
                 for wave in planes.waves(4.0).iter().flat_map(|waves| &waves.0) {
+                    assert!(planes.tell(wave));
                     let mut square = vec![1.0; planes.of_node.len()];
                     wave.multiply(&mut square);
                     assert!(planes.means(&square).iter().all(|mean| mean.abs() < 1e-12));
@@ -176,6 +191,9 @@ mod tests {
                 }
             }
         }
+        // On this box the longest wave along (3, 1) is as long as the distance of nodes on a plane.
+        let planes = Planes::new(&[3, 1], 20);
+        assert!(!planes.tell(&planes.waves(4.0)[0].0[0]));
     }
 
     #[test]
