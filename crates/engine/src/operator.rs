@@ -235,7 +235,7 @@ impl<const D: usize> Operator<D> {
     /// Finite elements on grids like this one.
     ///
     /// # Errors
-    /// [`Error::Fem`] if the scales do not fit the grid, [`Error::Model`] if the step cannot be calibrated.
+    /// [`Error::Fem`] if the scales do not fit the grid, [`Error::MeanCurvature`] if the step cannot be calibrated.
     ///
     /// # Panics
     /// If the method is another one.
