@@ -5,8 +5,8 @@ use std::path::Path;
 use willmore::prelude::*;
 
 use crate::examples::own_energy::Gravity;
-use crate::examples::own_operator;
 use crate::examples::own_scheme::StepDoubling;
+use crate::examples::{own_network, own_operator};
 
 /// Minimizations so accurate that only what is compared makes a difference.
 fn exact_newton() -> NewtonParams {
@@ -35,6 +35,10 @@ fn doubling() -> Willmore<2> {
 
 fn allen_cahn() -> Willmore<2> {
     own_operator::flow().unwrap()
+}
+
+fn residual() -> Willmore<2> {
+    own_network::flow().unwrap()
 }
 
 /// The difference of both ways of storing after two steps, over the motion.
@@ -82,7 +86,7 @@ fn on_bricks_an_own_scheme_is_that_of_the_whole_grid() {
 
 #[test]
 fn steps_of_own_parts_are_controlled_by_their_errors() {
-    for flow in [heavy(), doubling(), allen_cahn()] {
+    for flow in [heavy(), doubling(), allen_cahn(), residual()] {
         let mut flow = flow.start(&egg()).unwrap();
         let records: Vec<Record> = flow.take(6).map(Result::unwrap).collect();
         let error = |record: &Record| record.minimization.unwrap().estimates.unwrap().error;
@@ -110,7 +114,7 @@ fn a_scheme_without_estimates_is_not_controlled_by_them() {
 
 #[test]
 fn sizes_are_held_with_own_parts() {
-    for flow in [heavy(), doubling(), allen_cahn()] {
+    for flow in [heavy(), doubling(), allen_cahn(), residual()] {
         let mut flow = flow.keep_volume().start(&egg()).unwrap();
         let eps = flow.case().scales.eps;
         let area = |u: &Field<2>| ZeroSet::of(u, eps).unwrap().volume;
@@ -159,10 +163,11 @@ fn four_steps(flow: impl Fn() -> Willmore<2>, folder: &Path, interrupted: bool) 
 fn runs_with_own_parts_go_on_to_the_same_bytes() {
     let root = tempfile::tempdir().unwrap();
     type Make = fn() -> Willmore<2>;
-    let flows: [(&str, Make); 4] = [
+    let flows: [(&str, Make); 5] = [
         ("term", heavy),
         ("scheme", doubling),
         ("operator", allen_cahn),
+        ("network", residual),
         ("term on bricks", || {
             heavy().storage(Storage::Bricks).keep_volume()
         }),
