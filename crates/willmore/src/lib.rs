@@ -26,6 +26,7 @@
 //! |---|---|---|
 //! | a term of the energy | [`EnergyTerm`](solver::EnergyTerm) | `examples/own_energy.rs` |
 //! | a step of mean curvature flow | [`MeanCurvatureStep`](mean_curvature::MeanCurvatureStep) | `examples/own_operator.rs` |
+//! | a network | [`MeanCurvatureStep`](mean_curvature::MeanCurvatureStep) | `examples/own_network.rs` |
 //! | a time scheme | [`Scheme`](solver::Scheme) | `examples/own_scheme.rs` |
 //! | what chooses the size of steps | [`Controller`](engine::Controller) | `examples/own_controller.rs` |
 //! | a stop rule | [`StopRule`](engine::StopRule) | `examples/own_stop.rs` |

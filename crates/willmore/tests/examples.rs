@@ -6,6 +6,8 @@ mod own_controller;
 pub mod own_energy;
 #[path = "../examples/own_measure.rs"]
 mod own_measure;
+#[path = "../examples/own_network.rs"]
+pub mod own_network;
 #[path = "../examples/own_operator.rs"]
 pub mod own_operator;
 #[path = "../examples/own_scheme.rs"]
@@ -28,6 +30,11 @@ fn own_energy_runs() {
 #[test]
 fn own_measure_runs() {
     own_measure::main().unwrap();
+}
+
+#[test]
+fn own_network_runs() {
+    own_network::main().unwrap();
 }
 
 #[test]

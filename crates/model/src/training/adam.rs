@@ -80,21 +80,6 @@ pub fn loss<const D: usize, const R: usize>(
     (error.clone() * error).mean()
 }
 
-/// A batch of spheres before and after the step, `[batch, n, .., n]`.
-fn batch<const R: usize>(
-    data: &SphereData,
-    radii: &[f64],
-    device: &ComputeDevice,
-) -> (Tensor<R>, Tensor<R>) {
-    let mut shape = [data.cells; R];
-    shape[0] = radii.len();
-    let stack = |f: &dyn Fn(f64) -> f64| {
-        let values: Vec<f64> = radii.iter().flat_map(|&r| data.sphere(f(r))).collect();
-        device.tensor::<R>(&values, shape)
-    };
-    (stack(&|r| r), stack(&|r| data.shrunk(r)))
-}
-
 impl AdamParams {
     /// The next stage of the progressive training, on a grid of half the spacing: from the refined kernel and the activation
     /// of `coarse`, with a quarter of the epochs. The entries of a refined kernel are `2^-D` times as large, and Adam's steps
@@ -137,7 +122,7 @@ impl AdamParams {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let radii = data.draw_radii(data.count, &mut rng);
         let held_out = data.draw_radii(self.held_out.max(1), &mut rng);
-        let (held_spheres, held_targets) = batch::<R>(data, &held_out, device);
+        let (held_spheres, held_targets) = data.pairs::<R>(&held_out, device);
 
         let mut state = match state {
             Some(state) => state,
@@ -181,7 +166,7 @@ impl AdamParams {
             let mut batches = 0.0;
             for chunk in order.chunks(self.batch) {
                 let chosen: Vec<f64> = chunk.iter().map(|&i| radii[i]).collect();
-                let (spheres, targets) = batch::<R>(data, &chosen, device);
+                let (spheres, targets) = data.pairs::<R>(&chosen, device);
                 let variable = parameters.clone().autodiff().require_grad();
                 let value = loss::<D, R>(&variable, width, &layers, spheres, targets);
                 let gradients = value.clone().backward();

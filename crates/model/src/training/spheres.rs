@@ -1,8 +1,10 @@
 //! Training data: spheres shrinking by mean curvature to the radius `R(t) = (r^2 - 2 (D - 1) t)^(1/2)`.
 
+use burn::tensor::Tensor;
 use chacha20::ChaCha8Rng;
 use geometry::exact::mean_curvature_radius;
 use geometry::optimal_profile;
+use operators::ComputeDevice;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -112,6 +114,24 @@ impl SphereData {
                 optimal_profile(h * squared.sqrt() - radius, eps)
             })
             .collect()
+    }
+
+    /// Spheres of these radii before the step, and what it makes of them, both `[radii, n, .., n]`.
+    ///
+    /// # Panics
+    /// Unless the rank `R` is one more than the dimension.
+    pub fn pairs<const R: usize>(
+        &self,
+        radii: &[f64],
+        device: &ComputeDevice,
+    ) -> (Tensor<R>, Tensor<R>) {
+        let mut shape = [self.cells; R];
+        shape[0] = radii.len();
+        let stack = |f: &dyn Fn(f64) -> f64| {
+            let values: Vec<f64> = radii.iter().flat_map(|&r| self.sphere(f(r))).collect();
+            device.tensor::<R>(&values, shape)
+        };
+        (stack(&|r| r), stack(&|r| self.shrunk(r)))
     }
 }
 
