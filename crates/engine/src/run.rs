@@ -203,7 +203,7 @@ impl<const D: usize> Run<D> {
         Record {
             step: self.steps() + 1,
             time,
-            tau: made.map_or(size.tau, |made| made.tau),
+            tau: candidate.tau,
             step_size: size.whole,
             halvings,
             far,

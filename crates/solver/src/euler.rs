@@ -63,8 +63,11 @@ impl<const D: usize> Euler<D> {
             .insert(PREVIOUS.to_owned(), from.field.clone());
         memory.numbers.insert(PREVIOUS_TAU.to_owned(), size.tau);
         let state = at.after(minimum.u, memory);
-        let made = Some(made);
-        Ok(Candidate { state, made })
+        Ok(Candidate {
+            state,
+            tau: size.tau,
+            made: Some(made),
+        })
     }
 }
 

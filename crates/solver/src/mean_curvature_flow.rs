@@ -42,6 +42,7 @@ impl<const D: usize> Scheme<D> for MeanCurvatureFlow {
                 progress: from.progress + size.part(),
                 memory: Memory::default(),
             },
+            tau: problem.params.mcf_step,
             made: None,
         })
     }

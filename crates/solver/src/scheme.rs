@@ -30,6 +30,8 @@ impl StepSize {
 pub struct Candidate<const D: usize> {
     /// The state after the step.
     pub state: State<D>,
+    /// The size of the step: that which was asked for, but in flows whose steps have one size.
+    pub tau: f64,
     /// What the minimizations did; none for a scheme that minimizes nothing.
     pub made: Option<StepRecord>,
 }

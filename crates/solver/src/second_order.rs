@@ -148,6 +148,7 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         memory.fields.insert(RATE.to_owned(), rate);
         Ok(Candidate {
             state: At { from: &from, size }.after(second.u, memory),
+            tau: size.tau,
             made: Some(made),
         })
     }

@@ -34,7 +34,9 @@ impl Residual {
             let at = |i: usize| (-((i % WIDTH) as f64 - half).powi(2) / (2.0 * variance)).exp();
             let mut values: Vec<f64> = (0..WIDTH * WIDTH).map(|i| at(i) * at(i / WIDTH)).collect();
             let total: f64 = values.iter().sum();
-            values.iter_mut().for_each(|value| *value *= sum / total);
+            for value in &mut values {
+                *value *= sum / total;
+            }
             values[WIDTH * WIDTH / 2] += middle;
             Param::from_tensor(device.tensor(&values, [WIDTH; 2]))
         };

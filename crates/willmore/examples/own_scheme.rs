@@ -22,7 +22,9 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
         };
         let whole = self.whole.step(problem, from, size)?;
         let middle = self.half.step(problem, from, half)?;
-        let Candidate { mut state, made } = self.half.step(problem, &middle.state, half)?;
+        let Candidate {
+            mut state, made, ..
+        } = self.half.step(problem, &middle.state, half)?;
         // The records of a run count the steps of the scheme.
         state.step = from.step + 1;
 
@@ -45,7 +47,11 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
             estimates: Some(estimates),
             ..last
         });
-        Ok(Candidate { state, made })
+        Ok(Candidate {
+            state,
+            tau: size.tau,
+            made,
+        })
     }
 
     fn name(&self) -> &'static str {

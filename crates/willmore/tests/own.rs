@@ -91,7 +91,12 @@ fn steps_of_own_parts_are_controlled_by_their_errors() {
         let error = |record: &Record| record.minimization.unwrap().estimates.unwrap().error;
         assert!(records.iter().any(|record| error(record).is_some()));
         let sizes: Vec<f64> = records.iter().map(|record| record.tau).collect();
-        assert!(sizes.windows(2).any(|pair| pair[0].to_bits() != pair[1].to_bits()), "{sizes:?}");
+        assert!(
+            sizes
+                .windows(2)
+                .any(|pair| pair[0].to_bits() != pair[1].to_bits()),
+            "{sizes:?}"
+        );
         let energies: Vec<f64> = records.iter().filter_map(Record::willmore_energy).collect();
         assert!(
             energies.windows(2).all(|pair| pair[1] < pair[0]),
