@@ -135,6 +135,9 @@ fn trained(device: &ComputeDevice) -> Result<Residual, Failure> {
 }
 
 /// A flow with the network inside.
+///
+/// # Errors
+/// Those of the training and of the flow.
 pub fn flow() -> Result<Willmore<2>, Failure> {
     let device = ComputeDevice::default_compiled()?;
     let flow = Willmore::on(Grid::per_unit(128, 1.0)?).eps_over_h(EPS_OVER_H);
@@ -142,6 +145,9 @@ pub fn flow() -> Result<Willmore<2>, Failure> {
 }
 
 /// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of the training and of the flow.
 pub fn main() -> Result<(), Failure> {
     let device = ComputeDevice::default_compiled()?;
     let network = trained(&device)?;
