@@ -77,6 +77,7 @@ pub struct Splitting<const D: usize> {
 }
 
 #[derive(Clone)]
+#[expect(clippy::large_enum_variant, reason = "there are few")]
 enum Place<const D: usize> {
     Grid(Tensor<D>),
     Bricks {
