@@ -14,7 +14,7 @@ pub struct DomainScales {
     pub eps: f64,
     /// `tautilde`, the size of the step of mean curvature flow inside.
     pub inner_step: f64,
-    /// `g`, the motion of that step over the motion by mean curvature: 1 for an exact one ([`model::Calibration::response`]).
+    /// `g`, the motion of that step over the motion by mean curvature: 1 for an exact one ([`mean_curvature::Calibration::response`]).
     pub response: f64,
 }
 

@@ -46,7 +46,7 @@ pub struct StepRecord {
     /// `E[u_k, u_{k+1}]`.
     pub energy: f64,
     /// `eps / (2 c tautilde^2) |V[u] - u|^2`, the approximate Willmore energy of the result; `c = 1` without calibration. With spontaneous
-    /// curvature, tension or pressure the [energy](Helfrich) that these make of it.
+    /// curvature, tension, pressure or other [terms](crate::EnergyTerm) the energy that these make of it.
     pub willmore_energy: f64,
     /// Where the minimization began.
     pub start: Start,
@@ -54,7 +54,7 @@ pub struct StepRecord {
     pub newton: NewtonInfo,
     /// The surface tension `sigma` that holds the perimeter: `w + sigma A + p V` is stationary but for the motion, `w` being the Willmore
     /// energy, `A` the perimeter, and `V` the volume. Energy per length (2D) or area (3D); positive where the interface wants to grow. It comes
-    /// on top of the tension in [`Helfrich`].
+    /// on top of a [tension](crate::Tension) in the energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tension: Option<f64>,
     /// The pressure `p` that holds the volume, likewise: energy per area (2D) or volume (3D), positive where the inside wants to grow.

@@ -26,7 +26,7 @@ fn egg() -> Ellipse {
 }
 
 fn heavy() -> Willmore<2> {
-    Willmore::on(grid()).with(Gravity { g: 2e4 })
+    Willmore::on(grid()).with(Gravity { g: 300.0 })
 }
 
 fn doubling() -> Willmore<2> {
