@@ -58,6 +58,4 @@ mod documents {
     struct Readme;
     #[doc = include_str!("../../../docs/extending.md")]
     struct Extending;
-    #[doc = include_str!("../../../docs/calibration.md")]
-    struct Calibration;
 }
