@@ -17,8 +17,8 @@
 //! # }
 //! ```
 //!
-//! [`Willmore`] has the defaults that are good for most: the learned operator of the accurate recipe inside, calibrated; the whole grid or the bricks near the
-//! surface, whichever is less; steps of second order, as long as their errors allow. Everything else is a method of it.
+//! [`Willmore`] has the defaults that are good for most: the learned operator of the accurate recipe inside, calibrated; bricks near the
+//! surface where they are less than half of the grid; steps of second order, as long as their errors allow. Everything else is a method of it.
 //!
 //! # Parts of one's own
 //!
