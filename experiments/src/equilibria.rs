@@ -70,7 +70,7 @@ pub struct Equilibrium {
     pub ratio: f64,
     /// Of vesicles.
     pub branch: Option<Branch>,
-    /// The exact energy `w = 1/2 int H^2` at this radius, and its derivatives `-dw/dA` by the perimeter and `-dw/dV` by the volume.
+    /// The exact energy `w = 1/2 int kappa^2` at this radius, and its derivatives `-dw/dA` by the perimeter and `-dw/dV` by the volume.
     pub energy: f64,
     pub tension: f64,
     pub pressure: f64,

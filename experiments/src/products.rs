@@ -95,7 +95,7 @@ pub fn measure<const D: usize>(
     let (ratios, h) = (network.ratios(), grid.spacing());
     let scales = DomainScales {
         eps: ratios.eps_over_h * h,
-        inner_step: ratios.step_over_h2 * h * h,
+        mcf_step: ratios.step_over_h2 * h * h,
         response: 1.0,
     };
     let domain = Domain::new(grid.into(), [-1.0, 1.0], scales, device);

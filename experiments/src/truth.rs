@@ -245,7 +245,7 @@ pub struct Truth {
     /// The curve, or the profile of the surface.
     pub outline: Curve,
     /// Of a curve the extent from the origin along the x axis and along the diagonal, the enclosed area, the length, and
-    /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int H^2`.
+    /// `w = 1/2 int kappa^2`; of a surface area, volume, and `w = 1/2 int kappa^2`.
     pub sizes: Numbers,
 }
 

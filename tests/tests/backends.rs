@@ -341,9 +341,9 @@ fn passes<const D: usize>(nodes: &Nodes<D>, x: &[f64], taps: &[f64], adjoint: bo
     for pass in 0..D {
         let axis = if adjoint { pass } else { D - 1 - pass };
         let at = |node: usize, k: usize| {
-            let mut place = nodes.place(node);
+            let mut place = nodes.multi_index(node);
             place[axis] = (place[axis] + cells + k - reach) % cells;
-            nodes.at(place).map_or(0.0, |node| x[node])
+            nodes.at(place).stored().map_or(0.0, |node| x[node])
         };
         let tap = |k: usize| taps[if adjoint { taps.len() - 1 - k } else { k }];
         let sum = |node| (0..taps.len()).map(|k| tap(k) * at(node, k)).sum();

@@ -339,8 +339,8 @@ pub struct FlowOptions {
     #[arg(long, value_name = "STEPS")]
     pub ramp: Option<usize>,
 
-    /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (H - c0)^2 dA, H the sum of the principal
-    /// curvatures, positive for a ball [default: 0]
+    /// The curvature c0 that bends for nothing, one over a length: the energy is 1/2 int (kappa - c0)^2 dA, kappa the sum of the
+    /// principal curvatures, positive for a ball [default: 0]
     #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true)]
     pub spontaneous_curvature: Option<f64>,
 

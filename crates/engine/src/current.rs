@@ -34,8 +34,8 @@ impl<const D: usize> PhaseField<D> for Current<'_, D> {
         self.stored.values()
     }
 
-    fn rests(&self) -> [f64; 2] {
-        self.stored.rests()
+    fn phase_values(&self) -> [f64; 2] {
+        self.stored.phase_values()
     }
 
     fn at(&self, place: [usize; D]) -> f64 {

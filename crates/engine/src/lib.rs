@@ -84,7 +84,7 @@ pub use run::Run;
 pub use solver::{Held, Helfrich, Target};
 pub use step_control::StepControl;
 pub use steps::{Order, StepRule, TimeSteps};
-pub use stop::{Progress, Stop, StopRule};
+pub use stop::{Progress, Stop, StopRule, StopWhen};
 pub use storage::Storage;
 pub use store::{Checkpoints, METRICS, Store, TIMINGS, dimension, ended, initial, notes, records};
 pub use trajectory::Trajectory;

@@ -90,7 +90,7 @@ impl<const D: usize> Measure<D> {
         let near: Vec<([usize; D], f64)> = distances
             .enumerate()
             .filter(|(_, distance)| distance.abs() < NEAR * spacing)
-            .map(|(node, distance)| (nodes.place(node), distance))
+            .map(|(node, distance)| (nodes.multi_index(node), distance))
             .collect();
         Self::new(DISPLACEMENT, move |u, _| {
             let (mut weights, mut squares) = (0.0, 0.0);

@@ -78,7 +78,7 @@ impl<const D: usize> Own<D> {
             identity.insert("own_controller".to_owned(), of_controller);
         }
         if !self.stops.is_empty() {
-            let names: Vec<&str> = self.stops.iter().map(|rule| rule.name()).collect();
+            let names: Vec<String> = self.stops.iter().map(|rule| rule.name()).collect();
             identity.insert("own_stops".to_owned(), json!(names));
         }
         identity
@@ -87,7 +87,7 @@ impl<const D: usize> Own<D> {
 
 impl<const D: usize> std::fmt::Debug for Own<D> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let stops: Vec<&str> = self.stops.iter().map(|rule| rule.name()).collect();
+        let stops: Vec<String> = self.stops.iter().map(|rule| rule.name()).collect();
         let terms: Vec<Identity> = self.terms.iter().map(|term| term.identity()).collect();
         f.debug_struct("Own")
             .field("terms", &terms)

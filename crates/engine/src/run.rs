@@ -14,7 +14,9 @@ use crate::parts::{self, Parts};
 use crate::record::Values;
 use crate::step_control::StepControl;
 use crate::stop::Progress;
-use crate::{Attempts, Case, Controller, Current, Error, Flow, Measure, Record, Stop, Verdict};
+use crate::{
+    Attempts, Case, Controller, Current, Error, Flow, Measure, Record, Stop, StopRule, Verdict,
+};
 
 /// A case that is being computed: its problem, its state, what makes its steps and takes them, and the records so far.
 pub struct Run<const D: usize> {
@@ -231,13 +233,12 @@ impl<const D: usize> Run<D> {
             is_willmore: case.energy.is_willmore() && case.own.terms.is_empty(),
         };
         let driven = !case.held.is_reached(self.state.progress);
-        let mut stops = (case.stops.iter()).filter(|stop| !(driven && stop.is_rest()));
-        if let Some(stop) = stops.find(|stop| stop.holds(&progress)) {
+        let holds = |rule: &dyn StopRule<D>| !(driven && rule.is_rest()) && rule.holds(&progress);
+        if let Some(stop) = case.stops.iter().find(|stop| holds(*stop)) {
             return Some(stop.clone());
         }
-        let mut own = (case.own.stops.iter()).filter(|rule| !(driven && rule.is_rest()));
-        let rule = own.find(|rule| rule.holds(&progress))?;
-        Some(Stop::Own(rule.name().to_owned()))
+        let own = case.own.stops.iter().find(|rule| holds(&***rule))?;
+        Some(Stop::Own(own.name()))
     }
 
     /// The identity of the case, which takes all of its initial values.

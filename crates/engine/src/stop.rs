@@ -59,8 +59,8 @@ pub enum Stop {
 
 /// A rule that ends a flow.
 pub trait StopRule<const D: usize>: Send + Sync {
-    /// Its name, which the run says when it ends, and which resuming compares; with parameters it includes them.
-    fn name(&self) -> &str;
+    /// Its name with its parameters: the run says it at its end, and resuming compares it.
+    fn name(&self) -> String;
 
     /// Whether the flow ends here. It is asked at the start and after every step, and depends on nothing else, so that a run that is resumed ends where it
     /// would have ended.
@@ -69,6 +69,33 @@ pub trait StopRule<const D: usize>: Send + Sync {
     /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
     fn is_rest(&self) -> bool {
         false
+    }
+}
+
+/// A rule with a name that is a function: `StopWhen::new("late", |flow: &Progress<2>| flow.steps > 9)`.
+///
+/// The function depends on what it is shown alone, so that a run that is resumed ends where it would have ended.
+#[derive(Clone, Debug)]
+pub struct StopWhen<F> {
+    name: String,
+    holds: F,
+}
+
+impl<F> StopWhen<F> {
+    /// The rule with this name, which includes its parameters, and this condition.
+    pub fn new(name: impl Into<String>, holds: F) -> Self {
+        let name = name.into();
+        Self { name, holds }
+    }
+}
+
+impl<const D: usize, F: Fn(&Progress<'_, D>) -> bool + Send + Sync> StopRule<D> for StopWhen<F> {
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn holds(&self, progress: &Progress<'_, D>) -> bool {
+        (self.holds)(progress)
     }
 }
 
@@ -100,17 +127,22 @@ impl Stop {
         });
         ends.reduce(f64::min)
     }
+}
 
-    /// Whether it says that nothing happens any more, which it cannot say while sizes are driven to their targets.
-    pub(crate) fn is_rest(&self) -> bool {
+impl<const D: usize> StopRule<D> for Stop {
+    fn name(&self) -> String {
+        self.to_string()
+    }
+
+    fn is_rest(&self) -> bool {
         matches!(self, Self::Motion(_) | Self::EnergyAtRest)
     }
 
-    pub(crate) fn holds<const D: usize>(&self, flow: &Progress<'_, D>) -> bool {
+    fn holds(&self, flow: &Progress<'_, D>) -> bool {
         let last = flow.records.last();
         let energy = last.and_then(Record::willmore_energy);
         match *self {
-            // It is asked itself.
+            // The rule of this name is asked itself.
             Self::Own(_) => false,
             Self::Steps(steps) => flow.steps >= steps,
             // What is left of a sum of steps after the last one is rounding.

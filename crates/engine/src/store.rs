@@ -202,15 +202,18 @@ pub fn records(stored: &StoredRun) -> Result<Vec<Record>, Error> {
 #[derive(Serialize, Deserialize)]
 struct Remembered {
     cells: usize,
-    rests: [f64; 2],
+    phase_values: [f64; 2],
 }
 
 fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>, Error> {
     let state = &run.state;
     let fields = state.memory.fields.iter();
     let fields = fields.map(|(name, field)| {
-        let (cells, rests) = (field.nodes().grid().cells(), field.rests());
-        (name.clone(), Remembered { cells, rests })
+        let remembered = Remembered {
+            cells: field.nodes().grid().cells(),
+            phase_values: field.phase_values(),
+        };
+        (name.clone(), remembered)
     });
     let fields: BTreeMap<String, Remembered> = fields.collect();
     let notes = json!({
@@ -231,7 +234,7 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>
     }
     packed = with_field(packed, "current", &state.field)?;
     for (name, field) in &state.memory.fields {
-        packed = with_field(packed, name, field)?;
+        packed = with_field(packed, &in_memory(name), field)?;
     }
     if let Some(region) = &run.case.region {
         let ranges = region.ranges().iter();
@@ -256,6 +259,11 @@ fn with_field<'a, const D: usize>(
 
 fn marks<const D: usize>(nodes: &Nodes<D>) -> Option<Vec<f64>> {
     nodes.bricks().map(|bricks| bricks.marks())
+}
+
+/// The name of the array with a field in the memory of a state, apart from those of the run itself.
+fn in_memory(field: &str) -> String {
+    format!("memory/{field}")
 }
 
 /// The name of the marks of the bricks on which a field is stored.
@@ -287,23 +295,28 @@ fn state<const D: usize>(stored: &StoredRun, run: &Run<D>) -> Result<State<D>, E
     let (packed, grid) = (stored.state(), *run.case.grid());
     let notes = &packed.notes;
     let field = phase_field(stored, "current", grid)?;
-    let upload = |u: Stored<D>, rests: [f64; 2]| {
+    let upload = |u: Stored<D>, phase_values: [f64; 2]| {
         let nodes = u.nodes().clone();
-        DeviceField::upload(&Stored::new(u.into_values(), nodes, rests), &run.device)
+        DeviceField::upload(
+            &Stored::new(u.into_values(), nodes, phase_values),
+            &run.device,
+        )
     };
     let fields: BTreeMap<String, Remembered> = read(stored, &notes["memory"]["fields"])?;
     let mut memory = Memory {
         fields: BTreeMap::new(),
         numbers: read(stored, &notes["memory"]["numbers"])?,
     };
-    for (name, Remembered { cells, rests }) in fields {
-        let grid = Grid::new(cells, grid.side())?.with_origin(grid.origin())?;
-        let field = upload(phase_field(stored, &name, grid)?, rests);
-        memory.fields.insert(name, field);
+    for (name, remembered) in fields {
+        let grid = Grid::new(remembered.cells, grid.side())?.with_origin(grid.origin())?;
+        let field = phase_field(stored, &in_memory(&name), grid)?;
+        memory
+            .fields
+            .insert(name, upload(field, remembered.phase_values));
     }
     Ok(State {
         // As at the start, where nothing is stored.
-        field: upload(field, run.state.field.rests()),
+        field: upload(field, run.state.field.phase_values()),
         step: usize::try_from(packed.step).map_err(|error| unreadable(stored, error))?,
         time: read(stored, &notes["time"])?,
         progress: read(stored, &notes["progress"])?,

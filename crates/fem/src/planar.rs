@@ -90,7 +90,7 @@ impl ElementsOnPlanes {
             kind,
             scales: PlanarScales {
                 eps: eps_over_h,
-                time_step: step_over_h2,
+                mcf_step: step_over_h2,
                 spacing: 1.0 / square.sqrt(),
             },
             reaction: 9.0 / 8.0 * step_over_h2 / (eps_over_h * eps_over_h),
@@ -167,7 +167,7 @@ impl ElementsOnPlanes {
     /// The derivative of the left side of the step's equation in `v`.
     fn left<'a>(&self, v: &'a Col<f64>) -> Vec<Part<'a>> {
         let r = self.reaction;
-        let mut parts = vec![Part::Mass(1.0), Part::Stiffness(self.scales.time_step)];
+        let mut parts = vec![Part::Mass(1.0), Part::Stiffness(self.scales.mcf_step)];
         if self.kind == Kind::Implicit {
             parts.extend([Part::Mass(-r), Part::Weighted(3.0 * r, v)]);
         }
@@ -200,7 +200,7 @@ impl ElementsOnPlanes {
         let right = self.apply(&[Part::Mass(1.0)], false, u);
         let mut v = u.clone();
         for _ in 0..NEWTON {
-            let linear = [Part::Mass(1.0 - r), Part::Stiffness(self.scales.time_step)];
+            let linear = [Part::Mass(1.0 - r), Part::Stiffness(self.scales.mcf_step)];
             let cubic = [Part::Weighted(r, &v)];
             let residual =
                 &right - &self.apply(&linear, false, &v) - &self.apply(&cubic, false, &v);

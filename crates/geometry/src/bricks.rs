@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::Error;
 use crate::grid::digits;
 use crate::parallel::{self, Reader};
+use crate::{Error, Lookup};
 
 /// A brick that is not stored, in the tables of neighbours: the field is constant there, in the phase of positive values
 const POSITIVE: i32 = -1;
@@ -93,7 +93,7 @@ impl<const D: usize> Bricks<D> {
         )
     }
 
-    /// All but those on which the values of the whole grid, which `read` writes, are one of `rests`, that of the negative or of the positive
+    /// All but those on which the values of the whole grid, which `read` writes, are one of `phase_values`, that of the negative or of the positive
     /// phase, bit for bit, and beside which nothing is in the other phase.
     ///
     /// # Errors
@@ -102,10 +102,10 @@ impl<const D: usize> Bricks<D> {
         cells: usize,
         side: usize,
         read: &Reader<'_>,
-        rests: [f64; 2],
+        phase_values: [f64; 2],
     ) -> Result<Self, Error> {
         let all = Self::new(cells, side, |_| true, |_| false)?;
-        let (volume, rests) = (all.volume(), rests.map(f64::to_bits));
+        let (volume, phase_values) = (all.volume(), phase_values.map(f64::to_bits));
         // Whether a brick has nothing but rest values, and which phases are in it.
         let scan = |number: usize| {
             let (mut rest, mut phases) = (true, [false; 2]);
@@ -114,7 +114,7 @@ impl<const D: usize> Bricks<D> {
                 read(flat(all.multi_index(cell), cells), &mut row);
                 for value in &row {
                     let phase = usize::from(*value > 0.0);
-                    rest &= value.to_bits() == rests[phase];
+                    rest &= value.to_bits() == phase_values[phase];
                     phases[phase] = true;
                 }
             }
@@ -235,17 +235,23 @@ impl<const D: usize> Bricks<D> {
         })
     }
 
-    /// The stored cell at a place on the grid.
-    ///
-    /// # Errors
-    /// If no brick is active there: whether it is in the positive phase.
-    pub(crate) fn at(&self, index: [usize; D]) -> Result<usize, bool> {
+    /// The stored cell at a multi-index of the grid, or the phase where no brick is active.
+    pub(crate) fn at(&self, index: [usize; D]) -> Lookup {
         let brick = index.map(|at| at >> self.bits);
-        let number = self.number(brick).ok_or_else(|| self.is_positive(brick))?;
+        let Some(number) = self.number(brick) else {
+            return self.pure(brick);
+        };
         let inside = index
             .into_iter()
             .fold(0, |flat, at| (flat << self.bits) + self.within(at));
-        Ok(number * self.volume() + inside)
+        Lookup::Stored(number * self.volume() + inside)
+    }
+
+    /// The phase of a brick that is not active.
+    fn pure(&self, brick: [usize; D]) -> Lookup {
+        Lookup::Pure {
+            positive: self.is_positive(brick),
+        }
     }
 
     /// Of a place along an axis that within its brick.
@@ -258,10 +264,7 @@ impl<const D: usize> Bricks<D> {
         self.bits * (D - 1 - axis) as u32
     }
 
-    /// The cells so many steps along an axis from a stored one at a place, none of them further away than the side of a brick.
-    ///
-    /// # Errors
-    /// Where no brick is active: whether it is in the positive phase.
+    /// What lies so many steps along an axis from a stored cell at a multi-index, at most one side of a brick away.
     #[expect(clippy::inline_always, reason = "what it returns stays in registers")]
     #[inline(always)]
     pub(crate) fn along<const N: usize>(
@@ -270,7 +273,7 @@ impl<const D: usize> Bricks<D> {
         place: [usize; D],
         axis: usize,
         steps: [isize; N],
-    ) -> [Result<usize, bool>; N] {
+    ) -> [Lookup; N] {
         let (side, shift) = (self.side() as isize, self.shift(axis));
         let within = self.within(place[axis]) as isize;
         // All steps out of the brick in one direction lead into the same one.
@@ -280,22 +283,27 @@ impl<const D: usize> Bricks<D> {
         };
         let [before, after] = [false, true].map(|forward| {
             if !leaves(forward) {
-                return Ok(cell);
+                return Lookup::Stored(cell);
             }
             let brick = self.shifted(place.map(|at| at >> self.bits), axis, forward);
             match self.number(brick) {
-                Some(number) => Ok(number * self.volume() + (cell & (self.volume() - 1))),
-                None => Err(self.is_positive(brick)),
+                Some(number) => {
+                    Lookup::Stored(number * self.volume() + (cell & (self.volume() - 1)))
+                }
+                None => self.pure(brick),
             }
         });
-        let mut cells = [Ok(cell); N];
+        let mut cells = [Lookup::Stored(cell); N];
         for (found, step) in cells.iter_mut().zip(steps) {
             let (from, step) = match within + step {
                 end if end < 0 => (before, step + side),
                 end if end >= side => (after, step - side),
-                _ => (Ok(cell), step),
+                _ => (Lookup::Stored(cell), step),
             };
-            *found = from.map(|from| from.wrapping_add_signed(step << shift));
+            *found = match from {
+                Lookup::Stored(from) => Lookup::Stored(from.wrapping_add_signed(step << shift)),
+                pure @ Lookup::Pure { .. } => pure,
+            };
         }
         cells
     }
@@ -348,23 +356,29 @@ impl<const D: usize> Bricks<D> {
         values
     }
 
-    /// The values on the whole grid: `rests` outside, in the negative and in the positive phase.
-    pub fn scatter(&self, values: &[f64], rests: [f64; 2]) -> Vec<f64> {
+    /// The values on the whole grid: `phase_values` outside, in the negative and in the positive phase.
+    pub fn scatter(&self, values: &[f64], phase_values: [f64; 2]) -> Vec<f64> {
         let cells = self.cells();
         let mut dense = vec![0.0; cells.pow(D as u32)];
         let lines = dense.par_chunks_mut(cells).enumerate();
-        lines.for_each(|(line, part)| self.read(values, rests, line * cells, part));
+        lines.for_each(|(line, part)| self.read(values, phase_values, line * cells, part));
         dense
     }
 
     /// Fills a part of the whole grid from a cell on, both multiples of the side.
-    pub(crate) fn read(&self, values: &[f64], rests: [f64; 2], start: usize, part: &mut [f64]) {
+    pub(crate) fn read(
+        &self,
+        values: &[f64],
+        phase_values: [f64; 2],
+        start: usize,
+        part: &mut [f64],
+    ) {
         // A row of a brick lies in one row of the grid.
         for (k, row) in part.chunks_exact_mut(self.side()).enumerate() {
             let index = digits(start + (k << self.bits), self.cells());
             match self.at(index) {
-                Ok(cell) => row.copy_from_slice(&values[cell..][..self.side()]),
-                Err(phase) => row.fill(rests[usize::from(phase)]),
+                Lookup::Stored(cell) => row.copy_from_slice(&values[cell..][..self.side()]),
+                Lookup::Pure { positive } => row.fill(phase_values[usize::from(positive)]),
             }
         }
     }

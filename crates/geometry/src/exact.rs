@@ -1,6 +1,6 @@
 //! Exact solutions and energies.
 //!
-//! The Willmore energy is `w = 1/2 integral of H^2` with `H` the sum of the principal curvatures.
+//! The Willmore energy is `w = 1/2 integral of kappa^2` with `kappa` the sum of the principal curvatures.
 //! Mean curvature flow is the L2 gradient flow of the perimeter, Willmore flow that of `w`, both
 //! with unit speed. `dimension` is that of the space: 2 for circles, 3 for spheres.
 

@@ -153,7 +153,7 @@ impl<const D: usize> PhaseField<D> for Field<D> {
         self.values()
     }
 
-    fn rests(&self) -> [f64; 2] {
+    fn phase_values(&self) -> [f64; 2] {
         [-1.0, 1.0]
     }
 }

@@ -4,7 +4,7 @@
 
 use crate::error::positive;
 use crate::profile::profile_variable;
-use crate::{Error, PhaseField, parallel};
+use crate::{Error, Lookup, PhaseField, parallel};
 
 /// `L2` norm `sqrt(h^D sum (a - b)^2)` of the difference: the trapezoidal rule on the periodic box, not a mean. The sum is over the whole grid,
 /// in its order, wherever the values are stored.
@@ -38,7 +38,7 @@ pub fn has_interface<const D: usize>(u: &impl PhaseField<D>) -> bool {
 
 /// How many nodes that are not stored have positive values.
 fn positive_outside<const D: usize>(u: &impl PhaseField<D>) -> usize {
-    let outside = u.nodes().outside().into_iter().zip(u.rests());
+    let outside = u.nodes().outside().into_iter().zip(u.phase_values());
     let outside = outside.map(|(nodes, rest)| if rest > 0.0 { nodes } else { 0 });
     outside.sum()
 }
@@ -47,13 +47,15 @@ fn positive_outside<const D: usize>(u: &impl PhaseField<D>) -> usize {
 pub fn touches_side<const D: usize>(u: &impl PhaseField<D>, above: f64) -> bool {
     let nodes = u.nodes();
     let last = nodes.grid().cells() - 1;
-    let at_side = |node: usize| (nodes.place(node).iter()).any(|&i| i == 0 || i == last);
+    let at_side = |node: usize| (nodes.multi_index(node).iter()).any(|&i| i == 0 || i == last);
     let stored = (u.values().iter().enumerate()).any(|(node, u)| *u > above && at_side(node));
     let outside = |phase: bool| {
         let mut bricks = (nodes.bricks().into_iter()).flat_map(|bricks| bricks.not_active(phase));
         bricks.any(|[first, end]| first.contains(&0) || end.contains(&last))
     };
-    stored || ([false, true].into_iter()).any(|phase| u.value(Err(phase)) > above && outside(phase))
+    stored
+        || ([false, true].into_iter())
+            .any(|positive| u.value(Lookup::Pure { positive }) > above && outside(positive))
 }
 
 /// Perimeter `P_eps[u] = 1/2 integral of eps |grad u|^2 + Psi(u)/eps`, `Psi(u) = 9/16 (1-u^2)^2`.
@@ -79,17 +81,17 @@ pub fn perimeter<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<f64
     };
     let square = |[a, b, c, d]: [f64; 4]| ((27.0 * (c - b) - (d - a)) / 24.0).powi(2);
     let density = |node: usize| {
-        let (place, here) = (nodes.place(node), v[node]);
+        let (place, here) = (nodes.multi_index(node), v[node]);
         let along = |axis: usize| {
             let beside = nodes.along(node, place, axis, [-1, 1, 2]);
             let [before, next, second] = beside.map(|found| u.value(found));
             let mut squares = square([before, here, next, second]);
             // Edges where nothing is stored, at whose ends or beside which something is.
-            if beside[0].is_err() {
+            if beside[0].stored().is_none() {
                 squares += square([before, before, here, next]);
                 squares += square([before, before, before, here]);
             }
-            if beside[1].is_err() {
+            if beside[1].stored().is_none() {
                 squares += square([here, next, next, next]);
             }
             squares
@@ -97,7 +99,7 @@ pub fn perimeter<const D: usize>(u: &impl PhaseField<D>, eps: f64) -> Result<f64
         let gradient: f64 = (0..D).map(along).sum();
         0.5 * (eps / (h * h) * gradient + well(here))
     };
-    let outside = nodes.outside().into_iter().zip(u.rests());
+    let outside = nodes.outside().into_iter().zip(u.phase_values());
     let outside: f64 = outside.map(|(k, rest)| 0.5 * k as f64 * well(rest)).sum();
     Ok(nodes.grid().cell_volume() * (parallel::sum(v.len(), density) + outside))
 }
@@ -111,7 +113,7 @@ pub fn zero_set_volume<const D: usize>(u: &impl PhaseField<D>) -> f64 {
     let (nodes, v) = (u.nodes(), u.values());
     let (grid, orders) = (nodes.grid(), permutations::<D>());
     let cell = |index: usize| {
-        let node = nodes.place(index);
+        let node = nodes.multi_index(index);
         let corner = |bits: usize| {
             let upper =
                 std::array::from_fn(|axis| (node[axis] + (bits >> axis & 1)) % grid.cells());
@@ -236,7 +238,7 @@ pub fn bounding_box<const D: usize>(u: &impl PhaseField<D>) -> Option<BoundingBo
         std::array::from_fn(|axis| grid.coordinate(axis, place[axis]) + beyond(axis))
     };
     let around_node = |(node, &value): (usize, &f64)| {
-        let (place, inside) = (nodes.place(node), profile_variable(value));
+        let (place, inside) = (nodes.multi_index(node), profile_variable(value));
         // How far the interface is towards a neighbour outside, if that one is.
         let reach = |axis: usize, step: isize| {
             let end = if step < 0 { 0 } else { grid.cells() - 1 };
@@ -258,7 +260,7 @@ pub fn bounding_box<const D: usize>(u: &impl PhaseField<D>) -> Option<BoundingBo
     let of_brick = |[first, last]: [[usize; D]; 2]| [first, last].map(|at| point(at, &|_| 0.0));
     let outside = [false, true]
         .into_iter()
-        .filter(|phase| u.value(Err(*phase)) > 0.0);
+        .filter(|&positive| u.value(Lookup::Pure { positive }) > 0.0);
     let outside = outside.filter_map(|phase| nodes.bricks().map(|bricks| bricks.not_active(phase)));
     BoundingBox::around((stored.flat_map(around_node)).chain(outside.flatten().flat_map(of_brick)))
 }

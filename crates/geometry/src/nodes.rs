@@ -11,6 +11,28 @@ pub struct Nodes<const D: usize> {
     bricks: Option<Arc<Bricks<D>>>,
 }
 
+/// What [`Nodes`] hold at a point of the grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lookup {
+    /// The number of the node that is stored there.
+    Stored(usize),
+    /// Nothing is stored there: the field has the constant value of one pure phase.
+    Pure {
+        /// Whether it is the positive phase.
+        positive: bool,
+    },
+}
+
+impl Lookup {
+    /// The number of the stored node, if there is one.
+    pub fn stored(self) -> Option<usize> {
+        match self {
+            Self::Stored(node) => Some(node),
+            Self::Pure { .. } => None,
+        }
+    }
+}
+
 impl<const D: usize> From<Grid<D>> for Nodes<D> {
     fn from(grid: Grid<D>) -> Self {
         Self { grid, bricks: None }
@@ -47,29 +69,23 @@ impl<const D: usize> Nodes<D> {
             .map_or_else(|| self.grid.len(), |bricks| bricks.len())
     }
 
-    /// The place of a node along each axis of the grid.
-    pub fn place(&self, node: usize) -> [usize; D] {
+    /// The multi-index of a node in the grid.
+    pub fn multi_index(&self, node: usize) -> [usize; D] {
         match &self.bricks {
             None => self.grid.multi_index(node),
             Some(bricks) => bricks.multi_index(node),
         }
     }
 
-    /// The node at a place.
-    ///
-    /// # Errors
-    /// Where nothing is stored: whether the values there, which are constant, are positive.
-    pub fn at(&self, place: [usize; D]) -> Result<usize, bool> {
+    /// What lies at a multi-index of the grid.
+    pub fn at(&self, place: [usize; D]) -> Lookup {
         match &self.bricks {
-            None => Ok(self.grid.index(place)),
+            None => Lookup::Stored(self.grid.index(place)),
             Some(bricks) => bricks.at(place),
         }
     }
 
-    /// The nodes so many steps along an axis from one at a place, on bricks none of them further away than their side.
-    ///
-    /// # Errors
-    /// As [`Self::at`].
+    /// What lies so many steps along an axis from a node at a multi-index, on bricks at most one side of a brick away.
     #[expect(clippy::inline_always, reason = "what it returns stays in registers")]
     #[inline(always)]
     pub fn along<const N: usize>(
@@ -78,18 +94,18 @@ impl<const D: usize> Nodes<D> {
         place: [usize; D],
         axis: usize,
         steps: [isize; N],
-    ) -> [Result<usize, bool>; N] {
+    ) -> [Lookup; N] {
         match &self.bricks {
             None => {
                 let (here, cells) = (place[axis] as isize, self.grid.cells() as isize);
                 let stride = self.grid.stride(axis) as isize;
-                let mut nodes = [Ok(node); N];
+                let mut nodes = [Lookup::Stored(node); N];
                 for (found, steps) in nodes.iter_mut().zip(steps) {
                     let mut there = here + steps;
                     if !(0..cells).contains(&there) {
                         there = there.rem_euclid(cells);
                     }
-                    *found = Ok(node.wrapping_add_signed((there - here) * stride));
+                    *found = Lookup::Stored(node.wrapping_add_signed((there - here) * stride));
                 }
                 nodes
             }
@@ -112,13 +128,13 @@ pub trait PhaseField<const D: usize>: Sync {
     fn values(&self) -> &[f64];
 
     /// The values in the negative and in the positive phase, where nothing is stored.
-    fn rests(&self) -> [f64; 2];
+    fn phase_values(&self) -> [f64; 2];
 
-    /// The value at a node, or in a phase where nothing is stored: positive or not.
-    fn value(&self, found: Result<usize, bool>) -> f64 {
+    /// The value of what lies at a point of the grid.
+    fn value(&self, found: Lookup) -> f64 {
         match found {
-            Ok(node) => self.values()[node],
-            Err(phase) => self.rests()[usize::from(phase)],
+            Lookup::Stored(node) => self.values()[node],
+            Lookup::Pure { positive } => self.phase_values()[usize::from(positive)],
         }
     }
 
@@ -132,7 +148,7 @@ pub trait PhaseField<const D: usize>: Sync {
     fn read(&self, start: usize, part: &mut [f64]) {
         let values = self.values();
         match self.nodes().bricks() {
-            Some(bricks) => bricks.read(values, self.rests(), start, part),
+            Some(bricks) => bricks.read(values, self.phase_values(), start, part),
             None => part.copy_from_slice(&values[start..][..part.len()]),
         }
     }
@@ -159,8 +175,10 @@ pub trait PhaseField<const D: usize>: Sync {
         let mut values = Vec::with_capacity(bricks.len());
         for cell in (0..bricks.len()).step_by(piece) {
             match nodes.at(bricks.multi_index(cell)) {
-                Ok(node) => values.extend_from_slice(&stored[node..][..piece]),
-                Err(phase) => values.resize(values.len() + piece, self.value(Err(phase))),
+                Lookup::Stored(node) => values.extend_from_slice(&stored[node..][..piece]),
+                pure @ Lookup::Pure { .. } => {
+                    values.resize(values.len() + piece, self.value(pure));
+                }
             }
         }
         values
@@ -203,8 +221,8 @@ mod tests {
         let x: Vec<f64> = (0..few.len())
             .map(|i| 0.9 * (0.37 * i as f64).sin())
             .collect();
-        let rests = [-1.0, 1.0];
-        let dense = few.scatter(&x, rests);
+        let phase_values = [-1.0, 1.0];
+        let dense = few.scatter(&x, phase_values);
         let grid = Grid::new(48, 1.0).unwrap();
         let field = Field::from_values(grid, dense.clone()).unwrap();
         assert_eq!(field.values_on(&few), x);
@@ -217,7 +235,7 @@ mod tests {
         let inside = dense.iter().filter(|x| x.to_bits() == 1.0_f64.to_bits());
         assert_eq!(stored.outside()[1], inside.count());
         for (node, value) in x.iter().enumerate() {
-            let place = stored.place(node);
+            let place = stored.multi_index(node);
             let on_grid = grid.index(place);
             assert_eq!(dense[on_grid].to_bits(), value.to_bits());
             let steps = [-16, -3, -1, 1, 3, 16];
@@ -228,11 +246,11 @@ mod tests {
                     let mut there = place.map(|at| at as isize);
                     there[axis] += steps;
                     let there = there.map(|at| at.rem_euclid(48) as usize);
-                    assert_eq!(of_grid, Ok(grid.index(there)));
+                    assert_eq!(of_grid, Lookup::Stored(grid.index(there)));
                     assert_eq!(stored.at(there), found);
                     let found = match found {
-                        Ok(node) => x[node],
-                        Err(positive) => rests[usize::from(positive)],
+                        Lookup::Stored(node) => x[node],
+                        Lookup::Pure { positive } => phase_values[usize::from(positive)],
                     };
                     assert_eq!(found.to_bits(), dense[grid.index(there)].to_bits());
                 }

@@ -55,7 +55,7 @@ pub fn distances_from_phase_field<const D: usize>(
     Ok(Stored::new(
         distances,
         u.nodes().clone(),
-        u.rests().map(distance),
+        u.phase_values().map(distance),
     ))
 }
 

@@ -19,7 +19,7 @@ pub struct Stored<const D: usize> {
     nodes: Nodes<D>,
     values: Vec<f64>,
     /// The values in the negative and in the positive phase where nothing is stored.
-    rests: [f64; 2],
+    phase_values: [f64; 2],
 }
 
 /// Without its pure phases, as [`Stored::read_from`].
@@ -39,18 +39,18 @@ impl<const D: usize> PhaseField<D> for Stored<D> {
         &self.values
     }
 
-    fn rests(&self) -> [f64; 2] {
-        self.rests
+    fn phase_values(&self) -> [f64; 2] {
+        self.phase_values
     }
 }
 
 impl<const D: usize> Stored<D> {
-    /// As many values as there are nodes, and `rests` elsewhere, in the negative and in the positive phase.
-    pub fn new(values: Vec<f64>, nodes: Nodes<D>, rests: [f64; 2]) -> Self {
+    /// As many values as there are nodes, and `phase_values` elsewhere, in the negative and in the positive phase.
+    pub fn new(values: Vec<f64>, nodes: Nodes<D>, phase_values: [f64; 2]) -> Self {
         Self {
             nodes,
             values,
-            rests,
+            phase_values,
         }
     }
 
@@ -106,7 +106,7 @@ impl<const D: usize> Stored<D> {
 
     fn on_grid(&self) -> Vec<f64> {
         match self.nodes.bricks() {
-            Some(bricks) => bricks.scatter(&self.values, self.rests),
+            Some(bricks) => bricks.scatter(&self.values, self.phase_values),
             None => self.values.clone(),
         }
     }
@@ -123,7 +123,7 @@ impl<const D: usize> Stored<D> {
             Some(bricks) => self.values_on(bricks),
             None => self.on_grid(),
         };
-        Self::new(values, nodes.clone(), self.rests)
+        Self::new(values, nodes.clone(), self.phase_values)
     }
 
     /// Its values where `other` changes its sign, by linear interpolation along the edges of the grid.
@@ -131,8 +131,8 @@ impl<const D: usize> Stored<D> {
         let (nodes, own) = (&other.nodes, self.on(&other.nodes));
         let of_axis = |axis: usize| {
             parallel::filter_map(nodes.len(), CHUNK, &|node| {
-                let [next] = nodes.along(node, nodes.place(node), axis, [1]);
-                let next = next.ok()?;
+                let [next] = nodes.along(node, nodes.multi_index(node), axis, [1]);
+                let next = next.stored()?;
                 let [a, b] = [node, next].map(|k| other.values[k]);
                 let [c, d] = [node, next].map(|k| own.values[k]);
                 ((a > 0.0) != (b > 0.0)).then(|| c + (d - c) * a / (a - b))
@@ -145,7 +145,7 @@ impl<const D: usize> Stored<D> {
     #[must_use]
     pub fn map(&self, f: impl Fn(f64) -> f64 + Sync) -> Self {
         let values = parallel::values(self.values.len(), |i| f(self.values[i]));
-        Self::new(values, self.nodes.clone(), self.rests.map(f))
+        Self::new(values, self.nodes.clone(), self.phase_values.map(f))
     }
 
     /// A function of two fields, on the larger one of their sets of bricks, to which the other is carried.
@@ -167,8 +167,9 @@ impl<const D: usize> Stored<D> {
         }
         let (own, others) = (&self.values, &other.values);
         let values = parallel::values(own.len(), |i| f(own[i], others[i]));
-        let rests = [0, 1].map(|phase| f(self.rests[phase], other.rests[phase]));
-        Self::new(values, self.nodes.clone(), rests)
+        let phase_values =
+            [0, 1].map(|phase| f(self.phase_values[phase], other.phase_values[phase]));
+        Self::new(values, self.nodes.clone(), phase_values)
     }
 
     /// The Laplacian by centred differences of second order, periodic.
@@ -176,7 +177,7 @@ impl<const D: usize> Stored<D> {
     pub fn laplacian(&self) -> Self {
         let unit = self.grid().spacing().powi(-2);
         let at = |node: usize| {
-            let place = self.nodes.place(node);
+            let place = self.nodes.multi_index(node);
             let along = |axis: usize| {
                 let beside = self.nodes.along(node, place, axis, [-1, 1]);
                 let [before, after] = beside.map(|found| self.value(found));
@@ -195,7 +196,7 @@ impl<const D: usize> Stored<D> {
         let mut smoothed = self.clone();
         for axis in (0..D).chain(0..D) {
             let along = |node: usize| {
-                let place = self.nodes.place(node);
+                let place = self.nodes.multi_index(node);
                 let beside = self.nodes.along(node, place, axis, [-1, 1]);
                 let [before, after] = beside.map(|found| smoothed.value(found));
                 (before + 4.0 * smoothed.values[node] + after) / 6.0

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! volume = h^D sum H(d)                        perimeter = h^D sum delta(d) G
-//! mean curvature = h^D sum k delta(d) G        Willmore energy = h^D sum k^2/2 delta(d) G,     k = div(grad d / G)
+//! mean curvature = h^D sum kappa delta(d) G    Willmore energy = h^D sum kappa^2/2 delta(d) G,    kappa = div(grad d / G)
 //! ```
 //!
 //! with central differences of sixth order, over the nodes with `|d| < 10h` (`6h` for curvatures). By the coarea formula each is the
@@ -35,10 +35,10 @@ pub struct ZeroSet {
     pub perimeter: f64,
     /// Area (2D) or volume (3D) of `{u > 0}`.
     pub volume: f64,
-    /// The integral of the mean curvature `k`, the sum of the principal curvatures, positive for a ball: `2 pi` for a simple closed
+    /// The integral of the mean curvature `kappa`, the sum of the principal curvatures, positive for a ball: `2 pi` for a simple closed
     /// curve, `8 pi R` for a sphere.
     pub mean_curvature: f64,
-    /// The integral of `k^2/2`: `pi/R` for a circle, `8 pi` for a sphere.
+    /// The integral of `kappa^2/2`: `pi/R` for a circle, `8 pi` for a sphere.
     pub willmore_energy: f64,
     /// Standard deviation of `|grad d|` along level sets near the zero set, relative to its mean. It grows where the zero set bends or
     /// meets itself within a few spacings.

@@ -12,7 +12,7 @@ pub struct PlanarScales {
     /// Interface width `eps / h`.
     pub eps: f64,
     /// Time step `tautilde / h^2`.
-    pub time_step: f64,
+    pub mcf_step: f64,
     /// Distance of neighbouring planes; `1 / |a|` for the integer normal `a`.
     pub spacing: f64,
 }
@@ -82,7 +82,7 @@ pub(crate) const OFF: f64 = 1e-2;
 pub fn solve(step: &impl PlanarStep, position: f64) -> Result<PlanarInterface, Error> {
     let PlanarScales {
         eps,
-        time_step: tautilde,
+        mcf_step: tautilde,
         spacing,
     } = step.scales();
     let thickness = 2.0 * HALF_WIDTH * eps / spacing;

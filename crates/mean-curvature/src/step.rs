@@ -88,7 +88,7 @@ pub trait MeanCurvatureStep<const D: usize>: Send + Sync {
     }
 
     /// The values near -1 and 1 that it keeps, `v[z] = z`.
-    fn rests(&self) -> [f64; 2] {
+    fn phase_values(&self) -> [f64; 2] {
         [-1.0, 1.0]
     }
 
@@ -178,8 +178,8 @@ impl<const D: usize, S: MeanCurvatureStep<D> + ?Sized> MeanCurvatureStep<D> for 
         (**self).check(scales)
     }
 
-    fn rests(&self) -> [f64; 2] {
-        (**self).rests()
+    fn phase_values(&self) -> [f64; 2] {
+        (**self).phase_values()
     }
 
     fn brick_side(&self) -> Option<usize> {
@@ -259,17 +259,17 @@ pub struct StepScales {
     /// Interface width `eps`.
     pub eps: f64,
     /// The time `tautilde` that the step takes.
-    pub time_step: f64,
+    pub mcf_step: f64,
 }
 
 impl StepScales {
     /// Those of a step on this grid.
-    pub fn on<const D: usize>(grid: &Grid<D>, eps: f64, time_step: f64) -> Self {
+    pub fn on<const D: usize>(grid: &Grid<D>, eps: f64, mcf_step: f64) -> Self {
         Self {
             cells: grid.cells(),
             spacing: grid.spacing(),
             eps,
-            time_step,
+            mcf_step,
         }
     }
 }

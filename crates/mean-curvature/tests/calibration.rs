@@ -19,7 +19,7 @@ impl PlanarStep for Explicit {
     fn scales(&self) -> PlanarScales {
         PlanarScales {
             eps: self.eps,
-            time_step: TIME_STEP,
+            mcf_step: TIME_STEP,
             spacing: 1.0,
         }
     }

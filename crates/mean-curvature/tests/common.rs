@@ -16,7 +16,7 @@ pub fn device() -> ComputeDevice {
 #[derive(Clone)]
 pub struct Explicit {
     pub eps: f64,
-    pub time_step: f64,
+    pub mcf_step: f64,
     /// Whether it can be put on other grids.
     pub moves: bool,
 }
@@ -29,7 +29,7 @@ impl Explicit {
     /// The symbol of its derivative where `u` is 1 or -1.
     pub fn symbol(&self, angles: &[f64]) -> f64 {
         let laplacian: f64 = angles.iter().map(|k| 2.0 * (k.cos() - 1.0)).sum();
-        1.0 + self.time_step * (laplacian - 2.0 * self.reaction())
+        1.0 + self.mcf_step * (laplacian - 2.0 * self.reaction())
     }
 }
 
@@ -52,11 +52,11 @@ impl<const D: usize> MeanCurvatureStep<D> for Explicit {
             sum.reduce(|a, b| a + b).expect("there are some") - u.clone() * (2 * D) as f64;
         let cube = u.clone() * u.clone() * u.clone();
         let reaction = (u.clone() - cube) * self.reaction();
-        u + (laplacian + reaction) * self.time_step
+        u + (laplacian + reaction) * self.mcf_step
     }
 
     fn identity(&self) -> Identity {
-        let parameters = json!({ "eps": self.eps, "step": self.time_step });
+        let parameters = json!({ "eps": self.eps, "step": self.mcf_step });
         Identity::new("explicit Allen-Cahn", parameters)
     }
 
@@ -122,8 +122,9 @@ impl<const D: usize> Splitting<D> {
 
     fn on_bricks(&self, bricks: &Bricks<D>) -> Self {
         let (side, neighbours) = (bricks.side(), bricks.neighbours());
-        let rests = [-1.0, 1.0];
-        let outside = operators::convolution_of_outside::<D>(side, &neighbours, &self.taps, rests);
+        let phase_values = [-1.0, 1.0];
+        let outside =
+            operators::convolution_of_outside::<D>(side, &neighbours, &self.taps, phase_values);
         let count = bricks.places().len();
         let place = Place::Bricks {
             taps: device().tensor(&self.taps, [self.taps.len()]),

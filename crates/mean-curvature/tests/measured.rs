@@ -47,7 +47,7 @@ fn applied<const D: usize>(
 fn inverses_are_those_of_the_known_symbol() {
     let step = Explicit {
         eps: 3.0,
-        time_step: 0.2,
+        mcf_step: 0.2,
         moves: false,
     };
     let grid = Grid::<2>::new(30, 30.0).unwrap();
@@ -139,7 +139,7 @@ fn responses_that_are_not_finite_are_refused_by_the_name_of_the_step() {
         fn identity(&self) -> Identity {
             Identity::new("logarithm", serde_json::Value::Null)
         }
-        fn rests(&self) -> [f64; 2] {
+        fn phase_values(&self) -> [f64; 2] {
             [0.0, 1.0]
         }
     }
@@ -157,17 +157,17 @@ fn responses_that_are_not_finite_are_refused_by_the_name_of_the_step() {
 #[test]
 fn an_explicit_step_has_the_factors_of_its_profile() {
     fn check<const D: usize>(cells: usize, moves: bool) {
-        let (eps, time_step) = (if D == 2 { 2.5 } else { 1.5 }, 0.15);
+        let (eps, mcf_step) = (if D == 2 { 2.5 } else { 1.5 }, 0.15);
         let step = Explicit {
             eps,
-            time_step,
+            mcf_step,
             moves,
         };
         let scales = StepScales {
             cells,
             spacing: 1.0,
             eps,
-            time_step,
+            mcf_step,
         };
         let found = MeanCurvatureStep::<D>::calibrate(&step, &scales, &device()).unwrap();
         let ratio = found.factors.speed() / found.displacement.powi(2);
@@ -186,14 +186,14 @@ fn an_explicit_step_has_the_factors_of_its_profile() {
 fn boxes_without_room_for_two_interfaces_are_refused() {
     let step = Explicit {
         eps: 2.0,
-        time_step: 0.15,
+        mcf_step: 0.15,
         moves: false,
     };
     let scales = StepScales {
         cells: 24,
         spacing: 1.0,
         eps: 2.0,
-        time_step: 0.15,
+        mcf_step: 0.15,
     };
     let error = MeanCurvatureStep::<2>::calibrate(&step, &scales, &device()).unwrap_err();
     let found = error.downcast_ref::<Error>();
@@ -209,7 +209,7 @@ fn steps_without_an_interface_at_rest_are_refused() {
         cells: 64,
         spacing: 1.0,
         eps: 2.0,
-        time_step: 1.0,
+        mcf_step: 1.0,
     };
     let error = measured::calibrate(&step, &scales, &device()).unwrap_err();
     assert!(matches!(error, Error::Calibration { .. }), "{error}");

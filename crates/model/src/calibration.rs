@@ -39,7 +39,7 @@ impl<'a> NetworkOnPlanes<'a> {
             moments,
             scales: PlanarScales {
                 eps: ratios.eps_over_h,
-                time_step: ratios.step_over_h2,
+                mcf_step: ratios.step_over_h2,
                 spacing: 1.0 / square.sqrt(),
             },
         }
@@ -161,7 +161,7 @@ mod tests {
                 slope *= faer::Scale(jump / (slope.sum() * step.scales.spacing));
                 let psi = step.smoothed(&step.kernel, &slope);
                 let response = dot(&slope, &step.smoothed(&step.moments, &slope));
-                let scale = step.scales.time_step.powi(2) * dot(&optimal_slope, &optimal_slope);
+                let scale = step.scales.mcf_step.powi(2) * dot(&optimal_slope, &optimal_slope);
                 let energy = response.powi(2) / (dot(&psi, &psi) * scale);
                 assert!(
                     (energy / found.energy - 1.0).abs() < 1e-5,

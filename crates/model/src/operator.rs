@@ -169,16 +169,16 @@ impl<const D: usize> MeanCurvatureStep<D> for MeanCurvatureOperator<D> {
             cells,
             spacing,
             eps,
-            time_step,
+            mcf_step,
         } = *scales;
         let width = self.network.ratios().width;
-        (self.network).check_fits(Ratios::of_run(D, width, spacing, eps, time_step))?;
+        (self.network).check_fits(Ratios::of_run(D, width, spacing, eps, mcf_step))?;
         Ok(self.check_grid(cells)?)
     }
 
     /// Known where the kernel is separable; near those of all others are -1 and 1.
-    fn rests(&self) -> [f64; 2] {
-        (self.separable.as_ref()).map_or([-1.0, 1.0], SeparableOperator::rests)
+    fn phase_values(&self) -> [f64; 2] {
+        (self.separable.as_ref()).map_or([-1.0, 1.0], SeparableOperator::phase_values)
     }
 
     fn brick_side(&self) -> Option<usize> {

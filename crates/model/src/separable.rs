@@ -30,7 +30,7 @@ pub struct SeparableOperator<const D: usize> {
     taps: Vec<f64>,
     table: Tensor<2>,
     range: TableRange,
-    rests: [f64; 2],
+    phase_values: [f64; 2],
     slope: f64,
     network: Arc<Network>,
     device: ComputeDevice,
@@ -60,13 +60,13 @@ impl<const D: usize> SeparableOperator<D> {
         let taps = factor::<D>(network.kernel(), network.ratios().width)?;
         let mass = taps.iter().sum::<f64>().powi(D as i32);
         let [negative, positive] = [-1.0, 1.0].map(|phase| rest(table, mass, phase));
-        let rests = [negative?, positive?];
-        let slope = rests.map(|rest| mass * table.derivative(mass * rest, 1));
+        let phase_values = [negative?, positive?];
+        let slope = phase_values.map(|rest| mass * table.derivative(mass * rest, 1));
         Ok(Self {
             taps,
             table: coefficients.clone(),
             range: table.range(),
-            rests,
+            phase_values,
             slope: 0.5 * (slope[0] + slope[1]),
             network,
             device: device.clone(),
@@ -74,8 +74,8 @@ impl<const D: usize> SeparableOperator<D> {
     }
 
     /// The values in the negative and in the positive phase that the operator keeps: `V[z] = z`.
-    pub fn rests(&self) -> [f64; 2] {
-        self.rests
+    pub fn phase_values(&self) -> [f64; 2] {
+        self.phase_values
     }
 
     /// Cells along each axis of a brick: a power of two that is no less than what the kernel reaches.
@@ -110,7 +110,7 @@ impl<const D: usize> SeparableOperator<D> {
     /// The operator on some bricks.
     pub fn on(&self, bricks: &Bricks<D>, device: &ComputeDevice) -> BrickOperator<D> {
         let (side, neighbours) = (bricks.side(), bricks.neighbours());
-        let outside = convolution_of_outside::<D>(side, &neighbours, &self.taps, self.rests);
+        let outside = convolution_of_outside::<D>(side, &neighbours, &self.taps, self.phase_values);
         let count = bricks.places().len();
         BrickOperator {
             operator: self.clone(),
@@ -180,8 +180,8 @@ impl<const D: usize> MeanCurvatureStep<D> for BrickOperator<D> {
         true
     }
 
-    fn rests(&self) -> [f64; 2] {
-        self.operator.rests()
+    fn phase_values(&self) -> [f64; 2] {
+        self.operator.phase_values()
     }
 
     fn brick_side(&self) -> Option<usize> {

@@ -82,7 +82,7 @@ fn calibrations_are_the_stored_ones() {
             cells,
             spacing: 1.0,
             eps: 2.0,
-            time_step: 1.0,
+            mcf_step: 1.0,
         };
         let known = network.calibration().unwrap();
         let found = measured::calibrate(&operator, &scales, &device()).unwrap();
@@ -119,8 +119,11 @@ fn operators_say_on_what_they_work() {
     assert_eq!(operator.brick_side(), Some(16));
     let on_bricks = operator.on(&nodes).unwrap();
     assert_eq!(on_bricks.identity(), operator.identity());
-    let bits = |rests: [f64; 2]| rests.map(f64::to_bits);
-    assert_eq!(bits(on_bricks.rests()), bits(operator.rests()));
+    let bits = |phase_values: [f64; 2]| phase_values.map(f64::to_bits);
+    assert_eq!(
+        bits(on_bricks.phase_values()),
+        bits(operator.phase_values())
+    );
     assert_ne!(operator.identity(), paper.identity());
     let small = Grid::<2>::new(12, 1.0).unwrap();
     assert!(operator.on(&small.into()).is_err());

@@ -19,22 +19,22 @@ const LINES: usize = 8;
 /// The side of a brick is a multiple of the numbers in a register.
 const MOST_LANES: usize = 8;
 
-/// What constant values outside of active bricks, `rests` in the negative and in the positive phase, add to the convolution of a field with
+/// What constant values outside of active bricks, `phase_values` in the negative and in the positive phase, add to the convolution of a field with
 /// `taps` along each axis: [`crate::brick_convolution`] itself takes them as zero. The bricks are cubes of `side^D` cells; `neighbours` is
 /// their table.
 pub fn convolution_of_outside<const D: usize>(
     side: usize,
     neighbours: &[f64],
     taps: &[f64],
-    rests: [f64; 2],
+    phase_values: [f64; 2],
 ) -> Vec<f64> {
     let bricks = neighbours.len() / (2 * D);
     let zeros = vec![0.0; bricks * side.pow(D as u32)];
-    convolve(&zeros, (side, D), neighbours, taps, false, rests)
+    convolve(&zeros, (side, D), neighbours, taps, false, phase_values)
 }
 
 /// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see
-/// `rests`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
+/// `phase_values`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
 /// which is the transpose although passes that are cut at the edge of the bricks do not commute.
 ///
 /// `bricks` are cubes of `side^axes` cells, `neighbours` is the table of `geometry::Bricks::neighbours`, and the taps are no more
@@ -45,7 +45,7 @@ pub(crate) fn convolve<T: Real>(
     neighbours: &[T],
     taps: &[T],
     adjoint: bool,
-    rests: [f64; 2],
+    phase_values: [f64; 2],
 ) -> Vec<T> {
     let reach = taps.len() / 2;
     debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(MOST_LANES));
@@ -56,7 +56,7 @@ pub(crate) fn convolve<T: Real>(
     }
     weights.resize(weights.len() + ROWS - 1, T::zero());
     let volume = side.pow(axes as u32);
-    let mut rests = rests.map(T::of);
+    let mut phase_values = phase_values.map(T::of);
     let sum = taps.iter().fold(T::zero(), |sum, tap| sum + *tap);
     // Passes write by turns to a vector that is kept and to the one that is returned, to which the last one does.
     let mut kept = std::mem::take(&mut *lock(&T::shared().scratch));
@@ -64,7 +64,7 @@ pub(crate) fn convolve<T: Real>(
     let mut result = vec![T::zero(); x.len()];
     for pass in 0..axes {
         let axis = if adjoint { pass } else { axes - 1 - pass };
-        let constants = rests.map(|rest| vec![rest; volume]);
+        let constants = phase_values.map(|rest| vec![rest; volume]);
         let (from, to) = if (axes - pass).is_multiple_of(2) {
             (&mut result, &mut kept)
         } else {
@@ -83,7 +83,7 @@ pub(crate) fn convolve<T: Real>(
         };
         pass.run(to);
         // A constant outside is smoothed like the values inside.
-        rests = rests.map(|rest| rest * sum);
+        phase_values = phase_values.map(|rest| rest * sum);
     }
     *lock(&T::shared().scratch) = kept;
     result
@@ -277,15 +277,15 @@ mod tests {
         convolve(x, shape, &bricks.neighbours(), taps, adjoint, [0.0; 2])
     }
 
-    /// The definition on the whole grid: after every pass what is not active is `rests`, times what a pass makes of constants.
+    /// The definition on the whole grid: after every pass what is not active is `phase_values`, times what a pass makes of constants.
     fn by_passes<const D: usize>(
         bricks: &Bricks<D>,
         x: &[f64],
         taps: &[f64],
-        mut rests: [f64; 2],
+        mut phase_values: [f64; 2],
     ) -> Vec<f64> {
         let (cells, reach) = (bricks.cells(), taps.len() / 2);
-        let mut dense = bricks.scatter(x, rests);
+        let mut dense = bricks.scatter(x, phase_values);
         for axis in (0..D).rev() {
             let stride = cells.pow((D - 1 - axis) as u32);
             let passed: Vec<f64> = (0..dense.len())
@@ -299,8 +299,8 @@ mod tests {
                     .sum()
                 })
                 .collect();
-            rests = rests.map(|rest| rest * taps.iter().sum::<f64>());
-            dense = bricks.scatter(&bricks.gather(&passed), rests);
+            phase_values = phase_values.map(|rest| rest * taps.iter().sum::<f64>());
+            dense = bricks.scatter(&bricks.gather(&passed), phase_values);
         }
         bricks.gather(&dense)
     }
@@ -309,12 +309,12 @@ mod tests {
         let bricks = some::<D>(cells, side);
         let x = noise(bricks.len(), 1);
         let taps = noise(2 * reach + 1, 2);
-        let rests = [-0.9, 1.1];
-        let outside = convolution_of_outside::<D>(side, &bricks.neighbours(), &taps, rests);
+        let phase_values = [-0.9, 1.1];
+        let outside = convolution_of_outside::<D>(side, &bricks.neighbours(), &taps, phase_values);
         let linear = on(&bricks, &x, &taps, false);
         let both: Vec<f64> = linear.iter().zip(&outside).map(|(a, b)| a + b).collect();
         assert_near(&linear, &by_passes(&bricks, &x, &taps, [0.0; 2]), 1e-13);
-        assert_near(&both, &by_passes(&bricks, &x, &taps, rests), 1e-13);
+        assert_near(&both, &by_passes(&bricks, &x, &taps, phase_values), 1e-13);
     }
 
     #[test]

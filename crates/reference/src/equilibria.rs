@@ -1,12 +1,12 @@
 //! Equilibria: axisymmetric vesicles and closed elastic curves.
 //!
-//! Vesicles are stationary points of `w = 1/2 int (h - c_0)^2` for given area and volume (Canham 1970, Helfrich 1973; Seifert,
-//! Berndl, Lipowsky, Phys. Rev. A 44, 1991), those of `w + tension A - pressure V`:
+//! Vesicles are stationary points of `w = 1/2 int (kappa - c0)^2` for given area and volume (Canham 1970, Helfrich 1973; Seifert,
+//! Berndl, Lipowsky, Phys. Rev. A 44, 1991), those of `w + tension A + pressure V`:
 //!
-//! `-Laplace h - h (|A|^2 - h^2 / 2) - 2 c_0 K + (c_0^2 / 2 + tension) h - pressure = 0`,
+//! `-Laplace kappa - kappa (|A|^2 - kappa^2 / 2) - 2 c0 K + (c0^2 / 2 + tension) kappa + pressure = 0`,
 //!
-//! where `K` is the product of the principal curvatures. Closed elastic curves are those of `1/2 int kappa^2 + tension L - pressure A`
-//! for given length and area: the same equation with `h = kappa`, `K = 0`. It is solved by Newton's method for the sine series of
+//! where `kappa` is the sum and `K` the product of the principal curvatures. Closed elastic curves are those of `1/2 int kappa^2 + tension L + pressure A`
+//! for given length and area: the same equation with `K = 0`. It is solved by Newton's method for the sine series of
 //! the tangent angle at equal arc length, along branches from nearly round shapes.
 
 use std::f64::consts::PI;
@@ -38,16 +38,16 @@ pub enum Branch {
 pub struct Vesicle {
     /// Its shape.
     pub surface: Surface,
-    /// Spontaneous curvature `c_0`.
+    /// Spontaneous curvature `c0`.
     pub spontaneous_curvature: f64,
-    /// The derivative of the energy by the volume.
+    /// Minus the derivative of the energy by the volume.
     pub pressure: f64,
     /// Minus the derivative of the energy by the area.
     pub tension: f64,
 }
 
 impl Vesicle {
-    /// `w = 1/2 int (h - c_0)^2`.
+    /// `w = 1/2 int (kappa - c0)^2`.
     pub fn energy(&self) -> f64 {
         let (c, surface) = (self.spontaneous_curvature, &self.surface);
         surface.energy() - c * surface.mean_curvature() + c * c / 2.0 * surface.area()
@@ -59,7 +59,7 @@ impl Vesicle {
 pub struct Elastica {
     /// Its shape.
     pub curve: Curve,
-    /// The derivative of the energy by the area.
+    /// Minus the derivative of the energy by the area.
     pub pressure: f64,
     /// Minus the derivative of the energy by the length.
     pub tension: f64,
@@ -193,7 +193,7 @@ impl Problem {
         let equation = self.grid.expand(|i| {
             let product = nodes.curvature[i] * nodes.parallel[i];
             let stretch = (bend * bend / 2.0 + tension) * nodes.h[i];
-            stretch - velocity[i] - 2.0 * bend * product - pressure + force * nodes.tangent[i].re
+            stretch - velocity[i] - 2.0 * bend * product + pressure + force * nodes.tangent[i].re
         });
         let mut result = collect(self.grid.points / 2, |j| equation[j].re);
         if self.grid.folds == 1 {

@@ -6,15 +6,15 @@ use crate::spectral::{Coefficients, Grid, Series, collect};
 
 /// A gradient flow in `L2`, of a plane curve or of the surface that it generates about the y axis.
 ///
-/// `kappa` is the curvature of the curve; `h = kappa` in the plane, and on a surface `h = kappa + sin(theta) / x`, the sum of the
-/// principal curvatures, positive for spheres.
+/// In the plane `kappa` is the curvature of the curve. On a surface it is the sum of the principal curvatures, that of the curve and
+/// `sin(theta) / x`, positive for spheres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// Of `1/2 int h^2`: the outward normal velocity is `h'' + h (|A|^2 - h^2 / 2)`, in which `h''` is the Laplacian along the curve
+    /// Of `1/2 int kappa^2`: the outward normal velocity is `kappa'' + kappa (|A|^2 - kappa^2 / 2)`, in which `kappa''` is the Laplacian along the curve
     /// or on the surface and `|A|^2` the sum of the squared principal curvatures. In the plane that is `kappa_ss + kappa^3 / 2`, and
     /// the radius of a circle grows as `R^4 = R_0^4 + 2 t`; spheres are stationary.
     Willmore,
-    /// Of the length or the area: the outward normal velocity is `-h`. In the plane this is curve shortening.
+    /// Of the length or the area: the outward normal velocity is `-kappa`. In the plane this is curve shortening.
     MeanCurvature,
 }
 
@@ -83,7 +83,7 @@ impl Nodes {
         }
     }
 
-    /// `h'' + h (|A|^2 - h^2 / 2)`, in which the bracket is half the squared difference of the principal curvatures.
+    /// `kappa'' + kappa (|A|^2 - kappa^2 / 2)`, in which the bracket is half the squared difference of the principal curvatures.
     pub(crate) fn willmore(&self, grid: &Grid) -> Vec<f64> {
         let slope = grid.derivative(&grid.coefficients(self.h.clone()));
         let (first, second) = (grid.values(&slope), grid.values(&grid.derivative(&slope)));

@@ -4,8 +4,8 @@
 //! - [`revolution`]: Willmore and mean curvature flow of spheres, disks, tori and other surfaces of revolution, to about 1e-6.
 //! - [`equilibria`]: axisymmetric vesicles of given area and volume, and closed elastic curves of given length and area.
 //!
-//! Curves are counterclockwise, with the curvature `kappa` of a circle positive; surfaces have the sum `h` of their principal
-//! curvatures positive on spheres. Energies are `1/2 int kappa^2` and `1/2 int h^2`, which is `8 pi` for spheres. [`Flow`] states
+//! Curves are counterclockwise, with the curvature `kappa` of a circle positive; surfaces have the sum of their principal
+//! curvatures for `kappa`, positive on spheres. The energy is `1/2 int kappa^2`, `8 pi` for spheres. [`Flow`] states
 //! the normal velocities; time is that of the `L2` gradient flow. Coordinates and times have any consistent units.
 
 mod corner;

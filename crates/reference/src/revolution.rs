@@ -111,12 +111,12 @@ impl Surface {
             * self.integral(|nodes, i| nodes.radius[i].powi(2) * nodes.tangent[i].im)
     }
 
-    /// Integrated mean curvature `int h`, `h` the sum of the principal curvatures: `8 pi R` for spheres.
+    /// Integrated mean curvature `int kappa`, `kappa` the sum of the principal curvatures: `8 pi R` for spheres.
     pub fn mean_curvature(&self) -> f64 {
         TAU * self.profile.scale * self.integral(|nodes, i| nodes.radius[i] * nodes.h[i])
     }
 
-    /// Willmore energy `1/2 int h^2`: `8 pi` for spheres.
+    /// Willmore energy `1/2 int kappa^2`: `8 pi` for spheres.
     pub fn energy(&self) -> f64 {
         PI * self.integral(|nodes, i| nodes.radius[i] * nodes.h[i].powi(2))
     }

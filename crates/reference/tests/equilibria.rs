@@ -45,14 +45,14 @@ fn derivatives_agree(vesicles: &[Vesicle]) {
     let slope = rise / (vesicles[0].surface.volume() - vesicles[2].surface.volume());
     let (middle, surface) = (&vesicles[1], &vesicles[1].surface);
     assert!(
-        (slope / middle.pressure - 1.0).abs() < 1e-4,
+        (slope / -middle.pressure - 1.0).abs() < 1e-4,
         "{slope} {}",
         middle.pressure
     );
     // When all lengths grow, and the spontaneous curvature falls, by the same factor, the energy stays.
     let c = middle.spontaneous_curvature;
     let bending = c * (c * surface.area() - surface.mean_curvature());
-    let scaling = 3.0 * middle.pressure * surface.volume() - 2.0 * middle.tension * surface.area();
+    let scaling = -3.0 * middle.pressure * surface.volume() - 2.0 * middle.tension * surface.area();
     assert!((scaling - bending).abs() < 1e-6, "{scaling} {bending}");
 }
 
@@ -69,7 +69,7 @@ fn vesicles_solve_the_shape_equations_from_their_pole() {
         let vesicle = &vesicles(branch, c, &[volume]).unwrap()[0];
         assert!((vesicle.surface.area() - 4.0 * PI).abs() < 1e-9);
         assert!((vesicle.surface.reduced_volume() - volume).abs() < 1e-9);
-        let (pressure, tension) = (-vesicle.pressure, vesicle.tension);
+        let (pressure, tension) = (vesicle.pressure, vesicle.tension);
         let profile = vesicle.surface.profile();
         let (start, pole) = (1e-3, profile.curvature_at(0.0));
         let slope = (pole - c).powi(2) / 2.0 - pole * pole / 2.0 + tension;
@@ -109,7 +109,7 @@ fn elastic_curves_close_and_enclose_their_area() {
         // x, y, theta, kappa, its derivative, area, energy.
         let equations = |&[x, y, theta, k, slope, ..]: &[f64; 7]| {
             let (sin, cos) = theta.sin_cos();
-            let bending = tension * k - k.powi(3) / 2.0 - pressure;
+            let bending = tension * k - k.powi(3) / 2.0 + pressure;
             [
                 cos,
                 sin,

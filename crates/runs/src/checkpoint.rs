@@ -16,7 +16,7 @@ use crate::{Error, names};
 /// Not text, not any other format, and changed by programs that convert line ends.
 const MAGIC: [u8; 8] = *b"\x8fckpt\r\n\x1a";
 /// Bumped when a reader of the old format would misread the new one.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// Notes that are nested more deeply could not be read back.
 const DEEPEST: usize = 200;
 

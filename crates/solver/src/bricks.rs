@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Bricks, Nodes, PhaseField, Stored, parallel};
+use geometry::{Bricks, Lookup, Nodes, PhaseField, Stored, parallel};
 
 use crate::{DeviceField, Error};
 
@@ -152,12 +152,13 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
     parallel::filter_map(u.len(), CHUNK, &|node| {
-        let place = nodes.place(node);
+        let place = nodes.multi_index(node);
         let positive = u[node] > 0.0;
         let changes = (0..D).any(|axis| {
             let beside = nodes.along(node, place, axis, [-1, 1]);
-            beside.into_iter().any(|beside| {
-                positive != beside.map_or_else(|positive| positive, |node| u[node] > 0.0)
+            beside.into_iter().any(|beside| match beside {
+                Lookup::Stored(node) => positive != (u[node] > 0.0),
+                Lookup::Pure { positive: beside } => positive != beside,
             })
         });
         changes.then_some(place)

@@ -57,10 +57,10 @@ pub fn widths_between<const D: usize>(u: &Stored<D>, other: &Stored<D>) -> f64 {
     4.0 * *depth / 3.0
 }
 
-/// The factor by which the `L2` metric is too weak for a displacement `d` to a surface of mean curvature `h`, of which `bend` is the product.
+/// The factor by which the `L2` metric is too weak for a displacement `d` to a surface of mean curvature `kappa`; `bend` is `kappa d`.
 ///
-/// The metric measures in a straight line: the squared distance is `d^2` on the surface half-way, where areas are `1 - h d / 2` times those of
-/// the displaced one, and its derivative there is `(1 - h d / 4) d` for each area.
+/// The metric measures in a straight line: the squared distance is `d^2` on the surface half-way, where areas are `1 - kappa d / 2` times those of
+/// the displaced one, and its derivative there is `(1 - kappa d / 4) d` for each area.
 pub(crate) fn curvature_weight(bend: f64) -> f64 {
     /// Where the curvature changes within the displacement, at corners, it says nothing.
     const MOST: f64 = 0.5;

@@ -13,7 +13,7 @@ pub struct DomainScales {
     /// `eps`, the width of the interface.
     pub eps: f64,
     /// `tautilde`, the size of the step of mean curvature flow inside.
-    pub inner_step: f64,
+    pub mcf_step: f64,
     /// `g`, the motion of that step over the motion by mean curvature: 1 for an exact one ([`mean_curvature::Calibration::response`]).
     pub response: f64,
 }
@@ -23,7 +23,7 @@ pub struct DomainScales {
 ///
 /// A formula that is made of these operations is the same one in all ways of storing: on the whole grid, on bricks, and on the
 /// coarser grids on which steps begin. Tensors have the [shape](Self::shape) of the stored values and the precision of the device. What is not stored is constant, at
-/// one of two values, the [rests](Self::rests) of the phases.
+/// one of two values, the [phase_values](Self::phase_values) of the phases.
 ///
 /// ```
 /// use geometry::{Field, Grid};
@@ -33,7 +33,7 @@ pub struct DomainScales {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let device = ComputeDevice::default_compiled()?;
 /// let grid = Grid::<2>::new(64, 1.0)?;
-/// let scales = DomainScales { eps: 1.0 / 32.0, inner_step: 1.0 / 4096.0, response: 1.0 };
+/// let scales = DomainScales { eps: 1.0 / 32.0, mcf_step: 1.0 / 4096.0, response: 1.0 };
 /// let domain = Domain::new(grid.into(), [-1.0, 1.0], scales, &device);
 /// let wave = domain.sample(|[x, _]| (std::f64::consts::TAU * x).sin());
 /// let [along_x, _] = domain.gradient(&wave);
@@ -45,7 +45,7 @@ pub struct DomainScales {
 #[derive(Clone, Debug)]
 pub struct Domain<const D: usize> {
     nodes: Nodes<D>,
-    rests: [f64; 2],
+    phase_values: [f64; 2],
     scales: DomainScales,
     /// Where numbers are computed.
     home: ComputeDevice,
@@ -57,13 +57,13 @@ impl<const D: usize> Domain<D> {
     /// These nodes, with the values in the negative and in the positive phase where nothing is stored.
     pub fn new(
         nodes: Nodes<D>,
-        rests: [f64; 2],
+        phase_values: [f64; 2],
         scales: DomainScales,
         device: &ComputeDevice,
     ) -> Self {
         Self {
             nodes,
-            rests,
+            phase_values,
             scales,
             home: device.clone(),
             here: device.device().clone(),
@@ -121,8 +121,8 @@ impl<const D: usize> Domain<D> {
     }
 
     /// `tautilde`, the size of the step of mean curvature flow inside.
-    pub fn inner_step(&self) -> f64 {
-        self.scales.inner_step
+    pub fn mcf_step(&self) -> f64 {
+        self.scales.mcf_step
     }
 
     /// `g`, the [response](DomainScales::response) of that step to curvature.
@@ -137,8 +137,8 @@ impl<const D: usize> Domain<D> {
     }
 
     /// The values in the negative and in the positive phase, where nothing is stored.
-    pub fn rests(&self) -> [f64; 2] {
-        self.rests
+    pub fn phase_values(&self) -> [f64; 2] {
+        self.phase_values
     }
 
     /// How many nodes of the negative and of the positive phase are not stored.
@@ -197,7 +197,7 @@ impl<const D: usize> Domain<D> {
 
     /// The values at the places of the stored nodes.
     fn of_places(&self, value: impl Fn([usize; D]) -> f64 + Sync) -> Tensor<D> {
-        let values = parallel::values(self.nodes.len(), |node| value(self.nodes.place(node)));
+        let values = parallel::values(self.nodes.len(), |node| value(self.nodes.multi_index(node)));
         self.constant(&values, self.shape(), &self.here)
     }
 

@@ -156,7 +156,7 @@ impl<const D: usize> MinimizingMovement<D> {
         let grid = Grid::new(cells, 1.0)?;
         let scales = DomainScales {
             eps: 1.0,
-            inner_step: 1.0,
+            mcf_step: 1.0,
             response: 1.0,
         };
         let domain = Domain::new(grid.into(), [-1.0, 1.0], scales, device);

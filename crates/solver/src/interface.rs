@@ -66,7 +66,8 @@ impl<const D: usize> InterfaceModes<D> {
         nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
-        (tau, stiffness): (f64, f64),
+        tau: f64,
+        stiffness: f64,
         region: Option<&[bool]>,
     ) -> Option<Self> {
         let window = (CUT / stiffness.sqrt()).clamp(LEAST, WINDOW);
@@ -297,7 +298,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (tau, 1.0), None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, tau, 1.0, None).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -318,7 +319,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (1e-4, 1.0), None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, 1.0, None).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -340,7 +341,7 @@ mod tests {
         let grid = Grid::<D>::centred(cells, 1.0).unwrap();
         let ball = Ball::new([0.0; D], 0.3).unwrap();
         let u = phase_field(grid, &ball, EPS).unwrap().into_values();
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, (1e-4, 1.0), None).unwrap();
+        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, 1.0, None).unwrap();
         let r: Vec<f64> = (0..u.len()).map(|i| (0.37 * i as f64).sin()).collect();
         let (mut expected, mut found) = (r.clone(), r.clone());
         modes.update(&r, &mut expected);
@@ -387,11 +388,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, (1e-4, 1.0), None).is_none());
+        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, 1e-4, 1.0, None).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(
-            InterfaceModes::new(&grid.into(), square.values(), EPS, (1e-4, 1.0), None).is_none()
-        );
+        assert!(InterfaceModes::new(&grid.into(), square.values(), EPS, 1e-4, 1.0, None).is_none());
     }
 }

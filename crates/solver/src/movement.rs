@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 use geometry::{NodeSet, Nodes};
 
 use crate::constraints::{Constraints, Restoring};
-use crate::newton::{NewtonInfo, minimize_timed};
+use crate::newton::{NewtonInfo, Restrictions, minimize_timed};
 use crate::preconditioner::Preconditioner;
 use crate::region::Region;
 use crate::times::PhaseTimes;
@@ -161,7 +161,8 @@ impl<const D: usize> Minimizations<D> {
             phase,
             nodes: prepared.nodes.clone(),
             eps: params.eps,
-            step: (movement.tau, stiffness),
+            tau: movement.tau,
+            stiffness,
             region: prepared.region.clone(),
             interface: None,
         };
@@ -170,7 +171,10 @@ impl<const D: usize> Minimizations<D> {
         let mut held = Restoring::new(&movement.targets, current, params.eps, region);
         let minimized = minimize_timed(
             energy,
-            (region, held.as_mut()),
+            Restrictions {
+                region,
+                held: held.as_mut(),
+            },
             current.values(),
             movement.start.values(),
             Some(preconditioner),

@@ -107,7 +107,7 @@ pub fn minimize<const D: usize>(
 ) -> Result<(Tensor<D>, NewtonInfo), Error> {
     let (u, info, _) = minimize_timed(
         objective,
-        (None, None),
+        Restrictions::default(),
         previous,
         start,
         None,
@@ -117,10 +117,19 @@ pub fn minimize<const D: usize>(
     Ok((u, info))
 }
 
-/// [`minimize`] with a preconditioner and the time of its parts, in a region if there is one, and with measures held at targets.
+/// What restricts the values of a minimization.
+#[derive(Default)]
+pub(crate) struct Restrictions<'a, 'b, const D: usize> {
+    /// Where values change; everywhere if there is none.
+    pub region: Option<&'a Region<D>>,
+    /// What brings perimeter and volume back to their targets.
+    pub held: Option<&'a mut Restoring<'b, D>>,
+}
+
+/// [`minimize`] under constraints, with a preconditioner and the time of its parts.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
-    (region, held): (Option<&Region<D>>, Option<&mut Restoring<'_, D>>),
+    Restrictions { region, held }: Restrictions<'_, '_, D>,
     previous: &Tensor<D>,
     start: &Tensor<D>,
     preconditioner: Option<Preconditioner<D>>,

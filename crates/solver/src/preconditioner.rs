@@ -22,8 +22,10 @@ pub(crate) struct Preconditioner<const D: usize> {
     pub(crate) phase: PhaseInverse<D>,
     pub(crate) nodes: Nodes<D>,
     pub(crate) eps: f64,
-    /// The size of the time step, and the weight of the curvature in it.
-    pub(crate) step: (f64, f64),
+    /// The size of the time step.
+    pub(crate) tau: f64,
+    /// The weight of the curvature in it.
+    pub(crate) stiffness: f64,
     /// Where values may move, if not everywhere: it is projected there from both sides, which keeps it symmetric and positive.
     pub(crate) region: Option<Region<D>>,
     /// None before it [follows](Self::follow) the interface.
@@ -35,7 +37,8 @@ impl<const D: usize> Preconditioner<D> {
     pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
         let u = device.values(u.clone())?;
         let region = self.region.as_ref().map(|region| &*region.marks);
-        let modes = InterfaceModes::new(&self.nodes, &u, self.eps, self.step, region);
+        let modes =
+            InterfaceModes::new(&self.nodes, &u, self.eps, self.tau, self.stiffness, region);
         self.interface = modes.map(SharedUpdate::new);
         Ok(())
     }

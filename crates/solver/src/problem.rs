@@ -101,11 +101,11 @@ impl<const D: usize> Problem<D> {
         self.operator.on(&nodes).map_err(Error::Operator)?;
         let bricks = nodes.bricks().expect("they are near the interface");
         let values = (self.device).tensor(&initial.values_on(bricks), bricks.shape());
-        let rests = self.operator.rests();
+        let phase_values = self.operator.phase_values();
         Ok(State::at(DeviceField::new(
             values,
             nodes,
-            rests,
+            phase_values,
             &self.device,
         )))
     }
@@ -245,8 +245,8 @@ impl<const D: usize> Problem<D> {
     }
 
     /// The values of phase fields in the negative and in the positive phase where nothing is stored.
-    fn rests(&self, nodes: &Nodes<D>) -> [f64; 2] {
-        let of_bricks = nodes.bricks().map(|_| self.operator.rests());
+    fn phase_values(&self, nodes: &Nodes<D>) -> [f64; 2] {
+        let of_bricks = nodes.bricks().map(|_| self.operator.phase_values());
         of_bricks.unwrap_or([-1.0, 1.0])
     }
 
@@ -258,8 +258,8 @@ impl<const D: usize> Problem<D> {
     /// A field on the device, with the rest values of phase fields.
     pub fn upload(&self, u: &Stored<D>) -> DeviceField<D> {
         let values = DeviceField::upload(u, &self.device).values().clone();
-        let rests = self.rests(u.nodes());
-        DeviceField::new(values, u.nodes().clone(), rests, &self.device)
+        let phase_values = self.phase_values(u.nodes());
+        DeviceField::new(values, u.nodes().clone(), phase_values, &self.device)
     }
 
     /// The state on the bricks near its interface, if it is on bricks.
@@ -289,10 +289,15 @@ impl<const D: usize> Problem<D> {
     pub fn domain(&self, nodes: &Nodes<D>) -> Domain<D> {
         let scales = DomainScales {
             eps: self.params.eps,
-            inner_step: self.params.mcf_step,
+            mcf_step: self.params.mcf_step,
             response: self.response,
         };
-        Domain::new(nodes.clone(), self.rests(nodes), scales, &self.device)
+        Domain::new(
+            nodes.clone(),
+            self.phase_values(nodes),
+            scales,
+            &self.device,
+        )
     }
 
     /// The scaled energy counts points; this makes it the paper's, with true L2 norms: `2 eps h^D`, over the factor of the metric.

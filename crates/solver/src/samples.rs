@@ -206,14 +206,14 @@ impl<const D: usize> Lattice<'_, D> {
             return None;
         }
         let spacing = self.grid.spacing();
-        let index = nodes.place(node);
+        let index = nodes.multi_index(node);
         let here = self.distance(u[node]);
         let mut laplacian = 0.0;
         let mut normal = [0.0; D];
         for (axis, normal) in normal.iter_mut().enumerate() {
             let [before, after] = nodes.along(node, index, axis, [-1, 1]);
             let at = |node: usize| self.distance(u[node]);
-            let (after, before) = (at(after.ok()?), at(before.ok()?));
+            let (after, before) = (at(after.stored()?), at(before.stored()?));
             laplacian += after - 2.0 * here + before;
             *normal = after - before;
         }

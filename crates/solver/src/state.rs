@@ -13,23 +13,23 @@ use crate::Error;
 pub struct DeviceField<const D: usize> {
     values: Tensor<D>,
     nodes: Nodes<D>,
-    rests: [f64; 2],
+    phase_values: [f64; 2],
     device: ComputeDevice,
 }
 
 impl<const D: usize> DeviceField<D> {
-    /// A field whose values are on the device already, in the shape of the grid or of the bricks; `rests` are its values in the negative and in
+    /// A field whose values are on the device already, in the shape of the grid or of the bricks; `phase_values` are its values in the negative and in
     /// the positive phase where nothing is stored.
     pub fn new(
         values: Tensor<D>,
         nodes: Nodes<D>,
-        rests: [f64; 2],
+        phase_values: [f64; 2],
         device: &ComputeDevice,
     ) -> Self {
         Self {
             values,
             nodes,
-            rests,
+            phase_values,
             device: device.clone(),
         }
     }
@@ -39,7 +39,7 @@ impl<const D: usize> DeviceField<D> {
         let whole = || u.grid().shape();
         let shape = (u.nodes().bricks()).map_or_else(whole, |bricks| bricks.shape());
         let values = device.tensor(u.values(), shape);
-        Self::new(values, u.nodes().clone(), u.rests(), device)
+        Self::new(values, u.nodes().clone(), u.phase_values(), device)
     }
 
     /// The values, in the shape of the grid or of the bricks.
@@ -67,8 +67,8 @@ impl<const D: usize> DeviceField<D> {
     }
 
     /// The values in the negative and in the positive phase where nothing is stored.
-    pub fn rests(&self) -> [f64; 2] {
-        self.rests
+    pub fn phase_values(&self) -> [f64; 2] {
+        self.phase_values
     }
 
     /// The field on the host, stored in the same way; values that are not finite come along.
@@ -77,7 +77,7 @@ impl<const D: usize> DeviceField<D> {
     /// [`Error::Operators`] if the device fails.
     pub fn stored(&self) -> Result<Stored<D>, Error> {
         let values = self.device.values(self.values.clone())?;
-        Ok(Stored::new(values, self.nodes.clone(), self.rests))
+        Ok(Stored::new(values, self.nodes.clone(), self.phase_values))
     }
 
     /// The field on the host, on the whole grid.
@@ -193,7 +193,7 @@ mod tests {
         let disc = phase_field(grid, &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap();
         let nodes = bricks::near(&disc, operator.brick_side(), EPS).unwrap();
         let values = disc.values_on(nodes.bricks().unwrap());
-        let stored = Stored::new(values, nodes, operator.rests());
+        let stored = Stored::new(values, nodes, operator.phase_values());
         let field = DeviceField::upload(&stored, &device);
         (disc, field)
     }
@@ -201,17 +201,20 @@ mod tests {
     fn part_of(field: &Field<2>, like: &DeviceField<2>) -> Stored<2> {
         let nodes = like.nodes();
         let values = nodes.bricks().unwrap().gather(field.values());
-        Stored::new(values, nodes.clone(), like.rests)
+        Stored::new(values, nodes.clone(), like.phase_values)
     }
 
     /// Of the same fields on the whole grid the results have the same bits on the bricks.
     #[test]
     fn results_on_bricks_are_those_on_the_grid() {
         let (disc, active) = disc(0.5);
-        let (bricks, rests) = (active.nodes().bricks().unwrap().clone(), active.rests);
+        let (bricks, phase_values) = (
+            active.nodes().bricks().unwrap().clone(),
+            active.phase_values,
+        );
         let part = part_of(&disc, &active);
         let whole = part.field().unwrap().into_values();
-        let whole = Stored::new(whole, (*disc.grid()).into(), rests);
+        let whole = Stored::new(whole, (*disc.grid()).into(), phase_values);
         assert!(part.values().len() < whole.values().len());
         let same = |part: &Stored<2>, whole: &Stored<2>| {
             assert_eq!(part.values(), bricks.gather(whole.values()));

@@ -109,7 +109,7 @@ fn derivatives<const D: usize>(cells: usize) {
     let step = Arc::new(operator.on(&bricks, &device));
     let grid = Grid::new(cells, 1.0).unwrap();
     let nodes = Nodes::on_bricks(grid, Arc::new(bricks.clone()));
-    let domain = Domain::new(nodes, operator.rests(), scales(&grid), &device);
+    let domain = Domain::new(nodes, operator.phase_values(), scales(&grid), &device);
     let mut energy = MinimizingMovement::traced(MovementGraph {
         step,
         domain: &domain,
@@ -140,7 +140,7 @@ fn derivatives_pass_taylor_tests() {
 fn pure_phases_cost_nothing() {
     let (device, grid) = (device(), Grid::<3>::centred(32, 0.5).unwrap());
     let operator = SeparableOperator::<3>::new(&accurate(3), &device).unwrap();
-    for (phase, rest) in [false, true].into_iter().zip(operator.rests()) {
+    for (phase, rest) in [false, true].into_iter().zip(operator.phase_values()) {
         let some = |place: [usize; 3]| place[0] != place[1];
         let bricks = Bricks::new(grid.cells(), 8, some, |_| phase).unwrap();
         let u = vec![rest; bricks.len()];

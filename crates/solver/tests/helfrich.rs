@@ -93,13 +93,13 @@ fn by_formula<const D: usize>(
     helfrich: Helfrich,
 ) -> f64 {
     let (grid, h) = (domain.grid(), domain.spacing());
-    let (eps, tautilde) = (domain.eps(), domain.inner_step());
+    let (eps, tautilde) = (domain.eps(), domain.mcf_step());
     let (nodes, mut sum) = (domain.nodes(), 0.0);
     let unit = params(grid).energy_unit();
     let mut double_well = 0.0;
     let mut volume = domain.unstored()[1] as f64;
     for (node, residual) in residuals.iter().enumerate() {
-        let u = u[grid.index(nodes.place(node))];
+        let u = u[grid.index(nodes.multi_index(node))];
         let slope = 0.75 / eps * (1.0 - u * u);
         let shift = domain.response() * tautilde * helfrich.spontaneous_curvature * slope;
         sum += 0.5 * (residual + shift).powi(2);
@@ -331,7 +331,8 @@ fn balls_follow_the_ordinary_differential_equation() {
 /// The radius at rest, over the exact one.
 fn at_rest<const D: usize>(
     recipe: Shipped,
-    (grid, start): (Grid<D>, f64),
+    grid: Grid<D>,
+    start: f64,
     helfrich: Helfrich,
     expected: f64,
 ) -> f64 {
@@ -356,7 +357,7 @@ fn discs_come_to_rest_at_their_exact_radius() {
         // Its response to curvature is 3 % too small.
         (papers, bent(5.0)),
     ] {
-        let ratio = at_rest(recipe, (grid, 0.202), helfrich, 0.2);
+        let ratio = at_rest(recipe, grid, 0.202, helfrich, 0.2);
         println!("{recipe:?} {helfrich:?}: {ratio:.5}");
         assert!((ratio - 1.0).abs() < 0.01, "{helfrich:?}: {ratio}");
     }
@@ -367,7 +368,7 @@ fn discs_come_to_rest_at_their_exact_radius() {
 fn balls_come_to_rest_at_their_spontaneous_curvature() {
     let error = |cells| {
         let grid = Grid::<3>::per_unit(cells, 1.0).unwrap();
-        1.0 - at_rest(Shipped::Accurate, (grid, 0.24), bent(8.0), 0.25)
+        1.0 - at_rest(Shipped::Accurate, grid, 0.24, bent(8.0), 0.25)
     };
     let [coarse, fine] = [error(32), error(44)];
     println!("{coarse:.5} {fine:.5}");

@@ -45,8 +45,8 @@ impl<const D: usize, S: MeanCurvatureStep<D>> MeanCurvatureStep<D> for Unknown<S
         self.0.failure()
     }
 
-    fn rests(&self) -> [f64; 2] {
-        self.0.rests()
+    fn phase_values(&self) -> [f64; 2] {
+        self.0.phase_values()
     }
 
     fn phase_inverses(

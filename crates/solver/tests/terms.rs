@@ -68,7 +68,7 @@ impl<const D: usize> EnergyTerm<D> for Everything {
     }
 
     fn shift(&self, u: &Tensor<D>, on: &Domain<D>) -> Result<Option<Tensor<D>>, Error> {
-        let displacement = on.inner_step() * on.response() * 30.0;
+        let displacement = on.mcf_step() * on.response() * 30.0;
         Ok(Some(on.slope(u) * on.coordinate(0).sin() * displacement))
     }
 

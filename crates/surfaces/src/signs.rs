@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Bricks, Nodes, PhaseField, Stored};
+use geometry::{Bricks, Lookup, Nodes, PhaseField, Stored};
 
 /// Makes the signs of a distance agree where no surface is between: two neighbouring nodes that are both further than half a cell
 /// from the surface are on the same side. Noise folds the triangles of a scan, and where they are folded the sign of the
@@ -57,7 +57,7 @@ impl Sides {
                 let side = bricks.side();
                 (side, bricks.place(brick).map(|i| i * side))
             }
-            _ => (1, nodes.place(one)),
+            _ => (1, nodes.multi_index(one)),
         }
     }
 
@@ -65,9 +65,11 @@ impl Sides {
     fn at(&self, place: [usize; 3]) -> usize {
         let nodes = self.distance.nodes();
         match (nodes.at(place), nodes.bricks()) {
-            (Ok(node), _) => node,
-            (Err(_), Some(bricks)) => nodes.len() + bricks.flat(place.map(|i| i / bricks.side())),
-            (Err(_), None) => unreachable!("all of the grid is stored"),
+            (Lookup::Stored(node), _) => node,
+            (Lookup::Pure { .. }, Some(bricks)) => {
+                nodes.len() + bricks.flat(place.map(|i| i / bricks.side()))
+            }
+            (Lookup::Pure { .. }, None) => unreachable!("all of the grid is stored"),
         }
     }
 
@@ -113,7 +115,7 @@ impl Sides {
             changed,
             ..
         } = self;
-        let (mut nodes, rests) = (distance.nodes().clone(), distance.rests());
+        let (mut nodes, phase_values) = (distance.nodes().clone(), distance.phase_values());
         let (of_nodes, of_bricks) = inside.split_at(nodes.len());
         if let Some(old) = nodes.bricks().filter(|_| changed > 0) {
             let bricks = Bricks::new(
@@ -127,6 +129,6 @@ impl Sides {
         }
         let values = distance.into_values().into_iter().zip(of_nodes);
         let values = values.map(|(s, inside)| if *inside { -s.abs() } else { s.abs() });
-        (Stored::new(values.collect(), nodes, rests), changed)
+        (Stored::new(values.collect(), nodes, phase_values), changed)
     }
 }

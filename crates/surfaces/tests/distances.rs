@@ -303,7 +303,7 @@ fn signs_are_mended_where_nothing_is_stored() {
         },
     );
     let wrong = Nodes::on_bricks(grid, Arc::new(wrong.unwrap()));
-    let wrong = Stored::new(right.values().to_vec(), wrong, right.rests());
+    let wrong = Stored::new(right.values().to_vec(), wrong, right.phase_values());
     assert_ne!(wrong.field().unwrap(), right.field().unwrap());
     let (mended, changed) = mend_signs(wrong);
     assert_eq!(

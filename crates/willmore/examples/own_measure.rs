@@ -7,7 +7,7 @@ pub fn reach() -> Measure<2> {
     Measure::new("reach", |u, _time| {
         let nodes = u.nodes();
         let inside = (u.values().iter().enumerate()).filter(|(_, u)| **u > 0.0);
-        let xs = inside.map(|(node, _)| nodes.grid().coordinate(0, nodes.place(node)[0]));
+        let xs = inside.map(|(node, _)| nodes.grid().coordinate(0, nodes.multi_index(node)[0]));
         Ok(xs.reduce(f64::max))
     })
 }

@@ -16,7 +16,7 @@ impl AllenCahn {
     pub fn on(grid: Grid<2>, scales: &Scales, device: &ComputeDevice) -> Self {
         let scales = DomainScales {
             eps: scales.eps,
-            inner_step: scales.mcf_step,
+            mcf_step: scales.mcf_step,
             response: 1.0,
         };
         Self {
@@ -30,11 +30,11 @@ impl MeanCurvatureStep<2> for AllenCahn {
         let on = self.domain.at(&u.device());
         let a = 0.75 / on.eps();
         let reaction = (u.clone() - u.clone().powi_scalar(3)) * (2.0 * a * a);
-        u.clone() + (on.laplacian(&u) + reaction) * on.inner_step()
+        u.clone() + (on.laplacian(&u) + reaction) * on.mcf_step()
     }
 
     fn identity(&self) -> Identity {
-        let (eps, step) = (self.domain.eps(), self.domain.inner_step());
+        let (eps, step) = (self.domain.eps(), self.domain.mcf_step());
         Identity::new("Allen-Cahn step", json!({ "eps": eps, "tautilde": step }))
     }
 
@@ -56,7 +56,7 @@ pub fn flow() -> Result<Willmore<2>, Box<dyn std::error::Error>> {
     let grid = Grid::per_unit(128, 1.0)?;
     let inner = 0.2 * grid.spacing().powi(2);
     let device = ComputeDevice::default_compiled()?;
-    let flow = Willmore::on(grid).eps_over_h(3.0).inner_step(inner);
+    let flow = Willmore::on(grid).eps_over_h(3.0).mcf_step(inner);
     let step = AllenCahn::on(grid, &flow.scales(), &device);
     Ok(flow.operator(step).device(&device))
 }

@@ -6,20 +6,11 @@ use willmore::prelude::*;
 pub struct Round {
     /// The quotient at which the flow ends.
     pub quotient: f64,
-    name: String,
-}
-
-impl Round {
-    /// The rule for a quotient.
-    pub fn at(quotient: f64) -> Self {
-        let name = format!("round to {quotient}");
-        Self { quotient, name }
-    }
 }
 
 impl StopRule<2> for Round {
-    fn name(&self) -> &str {
-        &self.name
+    fn name(&self) -> String {
+        format!("round to {}", self.quotient)
     }
 
     fn holds(&self, progress: &Progress<'_, 2>) -> bool {
@@ -39,7 +30,7 @@ impl StopRule<2> for Round {
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let mut flow = Willmore::on(grid)
-        .until_rule(Round::at(0.98))
+        .until_rule(Round { quotient: 0.98 })
         .start(&Ellipse::new([0.3, 0.2])?)?;
     while flow.step()?.is_some() {}
     let ended = flow.ended().expect("it is over");

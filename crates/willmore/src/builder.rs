@@ -32,7 +32,7 @@ pub struct Willmore<const D: usize> {
     recipe: Scheme,
     network: Option<Network>,
     step: Option<Arc<dyn MeanCurvatureStep<D>>>,
-    inner_step: Option<f64>,
+    mcf_step: Option<f64>,
     storage: Storage,
     steps: TimeSteps,
     newton: Option<NewtonParams>,
@@ -61,7 +61,7 @@ impl<const D: usize> Willmore<D> {
             recipe: Scheme::Accurate,
             network: None,
             step: None,
-            inner_step: None,
+            mcf_step: None,
             storage: Storage::Auto,
             steps: TimeSteps::controlled(ErrorControl::default()),
             newton: None,
@@ -106,8 +106,8 @@ impl<const D: usize> Willmore<D> {
 
     /// The size `tautilde` of the step of mean curvature flow inside.
     #[must_use]
-    pub fn inner_step(mut self, tautilde: f64) -> Self {
-        self.inner_step = Some(tautilde);
+    pub fn mcf_step(mut self, tautilde: f64) -> Self {
+        self.mcf_step = Some(tautilde);
         self
     }
 
@@ -218,7 +218,7 @@ impl<const D: usize> Willmore<D> {
     /// The lengths that a step of mean curvature flow inside has to fit: interface width and inner step.
     pub fn scales(&self) -> Scales {
         let mut scales = Scales::of_grid(self.grid.spacing(), self.eps_over_h);
-        scales.mcf_step = self.inner_step.unwrap_or(scales.mcf_step);
+        scales.mcf_step = self.mcf_step.unwrap_or(scales.mcf_step);
         if let Some(newton) = self.newton {
             scales.newton = newton;
         } else if self.steps.order != engine::Order::First {

@@ -5,8 +5,8 @@ pub use crate::{Kept, Willmore};
 pub use engine::{
     Attempts, Case, Checkpoints, Controller, Current, EqualSteps, ErrorControl, Event, Measure,
     Method, Observer, Operator, Order, Own, Progress, Record, Run, Samples, Scales,
-    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, Storage, Store, TimeSteps, Trajectory,
-    Verdict,
+    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, StopWhen, Storage, Store, TimeSteps,
+    Trajectory, Verdict,
 };
 pub use fem::FiniteElementStep;
 pub use geometry::exact;

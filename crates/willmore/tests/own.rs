@@ -131,6 +131,47 @@ fn sizes_are_held_with_own_parts() {
     }
 }
 
+/// An own rule that is a function of an own measure ends flows with each of the other parts.
+#[test]
+fn rules_and_measures_see_flows_with_own_parts() {
+    const EPS: f64 = 2.0 / 64.0;
+    const CHANGE: f64 = 1e-4;
+    for flow in [heavy(), doubling(), allen_cahn(), residual()] {
+        let length = Measure::new("length", |u, _| perimeter(u, EPS).map(Some));
+        let changed = |length: f64, flow: &Progress<'_, 2>| {
+            (length / perimeter(flow.initial, EPS).unwrap() - 1.0).abs() >= CHANGE
+        };
+        let rule = StopWhen::new("longer or shorter", move |flow: &Progress<'_, 2>| {
+            let last = flow.records.last().and_then(|last| last.measure("length"));
+            last.is_some_and(|length| changed(length, flow))
+        });
+        let flow = flow.measure(length).until_rule(rule).until(Stop::Steps(60));
+        let mut flow = flow.start(&egg()).unwrap();
+        let start = flow.start()["length"];
+        while flow.step().unwrap().is_some() {}
+        let named = Stop::Own("longer or shorter".to_owned());
+        assert_eq!(flow.ended(), Some(named));
+        let lengths = flow.records().iter().map(|record| record.measure("length"));
+        let changes: Vec<f64> = lengths
+            .map(|length| (length.unwrap() / start - 1.0).abs())
+            .collect();
+        let (last, before) = changes.split_last().unwrap();
+        let went_on = before.iter().all(|change| *change < CHANGE);
+        assert!(*last >= CHANGE && went_on, "{changes:?}");
+    }
+}
+
+/// Flows with own parts, by the names that a process of its own is given.
+pub const FLOWS: [(&str, fn() -> Willmore<2>); 5] = [
+    ("term", heavy),
+    ("scheme", doubling),
+    ("operator", allen_cahn),
+    ("network", residual),
+    ("term on bricks", || {
+        heavy().storage(Storage::Bricks).keep_volume()
+    }),
+];
+
 /// Asks for an end after so many records.
 struct After(usize, Interrupt);
 
@@ -143,44 +184,36 @@ impl Observer<2> for After {
     }
 }
 
-/// The bits of the phase field after four steps in a folder, interrupted or not after two.
-fn four_steps(flow: impl Fn() -> Willmore<2>, folder: &Path, interrupted: bool) -> Vec<u64> {
-    let run = |until: usize| {
-        let mut kept = flow()
-            .until(Stop::Steps(4))
-            .start_in(folder, &egg())
-            .unwrap();
-        let interrupt = Interrupt::never();
-        let mut after = After(until, interrupt.clone());
-        kept.advance(&mut [&mut after], &interrupt).unwrap();
-        kept.run
-    };
-    if interrupted {
-        assert_eq!(run(2).records().len(), 2);
-    }
-    let run = run(usize::MAX);
-    assert_eq!(run.records().len(), 4);
-    run.field().values().iter().map(|u| u.to_bits()).collect()
+/// Four steps of a flow that is kept in a folder, or what is left of them.
+pub fn four_steps(
+    flow: fn() -> Willmore<2>,
+    folder: &Path,
+    observers: &mut [&mut dyn Observer<2>],
+    interrupt: &Interrupt,
+) -> Run<2> {
+    let flow = flow().until(Stop::Steps(4));
+    let mut kept = flow.start_in(folder, &egg()).unwrap();
+    kept.advance(observers, interrupt).unwrap();
+    kept.run
 }
 
 #[test]
-fn runs_with_own_parts_go_on_to_the_same_bytes() {
+fn interrupted_runs_with_own_parts_go_on_to_the_same_bytes() {
     let root = tempfile::tempdir().unwrap();
-    type Make = fn() -> Willmore<2>;
-    let flows: [(&str, Make); 5] = [
-        ("term", heavy),
-        ("scheme", doubling),
-        ("operator", allen_cahn),
-        ("network", residual),
-        ("term on bricks", || {
-            heavy().storage(Storage::Bricks).keep_volume()
-        }),
-    ];
-    for (name, flow) in flows {
+    for (name, flow) in FLOWS {
         let [whole, parts] =
             ["whole", "parts"].map(|part| root.path().join(format!("{name} {part}")));
-        let same = four_steps(flow, &whole, false) == four_steps(flow, &parts, true);
-        assert!(same, "{name}");
+        let interrupt = Interrupt::never();
+        let mut after = After(2, interrupt.clone());
+        let first = four_steps(flow, &parts, &mut [&mut after], &interrupt);
+        assert_eq!(first.records().len(), 2, "{name}");
+        let [whole, parts] = [whole, parts].map(|folder| {
+            let run = four_steps(flow, &folder, &mut [], &Interrupt::never());
+            assert_eq!(run.records().len(), 4, "{name}");
+            let bits = run.field().values().iter().map(|u| u.to_bits());
+            bits.collect::<Vec<u64>>()
+        });
+        assert!(whole == parts, "{name}");
     }
 }
 

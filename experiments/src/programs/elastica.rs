@@ -54,7 +54,7 @@ fn program(Options { run: options }: &Options) -> Result<()> {
             branch: None,
             energy: exact.curve.energy() / RADIUS,
             tension: exact.tension / RADIUS.powi(2),
-            pressure: -exact.pressure / RADIUS.powi(3),
+            pressure: exact.pressure / RADIUS.powi(3),
             curve: exact.curve,
         };
         let initial = equilibrium.start(grid, scales.eps, 0.0)?;

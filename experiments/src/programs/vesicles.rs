@@ -121,7 +121,7 @@ fn program(options: &Options) -> Result<()> {
                 branch: Some(branch),
                 energy: exact.energy(),
                 tension: exact.tension / radius.powi(2),
-                pressure: -exact.pressure / radius.powi(3),
+                pressure: exact.pressure / radius.powi(3),
                 curve: exact.surface.profile().clone(),
             };
             let initial = match all.last() {

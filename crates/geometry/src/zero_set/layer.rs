@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::positive;
 use crate::nodes::check_finite;
-use crate::{Error, Grid, Nodes, PhaseField, distance_from_phase_field, parallel, vector};
+use crate::{Error, Grid, Lookup, Nodes, PhaseField, distance_from_phase_field, parallel, vector};
 
 /// Width of the kernel in spacings of the grid.
 const WIDTH: f64 = 1.25;
@@ -102,8 +102,8 @@ pub(super) struct Layer<const D: usize> {
     reach: f64,
     /// The distance variable at all stored nodes,
     distance: Vec<f64>,
-    /// and where nothing is stored.
-    rests: [f64; 2],
+    /// and in the two pure phases.
+    pure_distances: [f64; 2],
     /// The nodes of the layer in the order of storage.
     pub(super) nodes: Vec<u32>,
     /// Where a stored node is in `nodes`.
@@ -115,10 +115,15 @@ pub(super) struct Layer<const D: usize> {
 
 impl<const D: usize> Layer<D> {
     pub(super) fn new(u: &impl PhaseField<D>, eps: f64) -> Result<Self, Error> {
-        Self::of((u.nodes().clone(), u.values(), u.rests()), eps)
+        Self::of(u.nodes().clone(), u.values(), u.phase_values(), eps)
     }
 
-    fn of((stored, values, rests): (Nodes<D>, &[f64], [f64; 2]), eps: f64) -> Result<Self, Error> {
+    fn of(
+        stored: Nodes<D>,
+        values: &[f64],
+        phase_values: [f64; 2],
+        eps: f64,
+    ) -> Result<Self, Error> {
         positive("eps", eps)?;
         check_finite(values)?;
         let grid = *stored.grid();
@@ -135,7 +140,7 @@ impl<const D: usize> Layer<D> {
             kernel: Kernel::new(grid.spacing()),
             reach: REACH * grid.spacing(),
             distance: parallel::values(values.len(), |node| distance(values[node])),
-            rests: rests.map(distance),
+            pure_distances: phase_values.map(distance),
             nodes: Vec::new(),
             places: vec![NOWHERE; values.len()],
             around: OnceLock::new(),
@@ -159,10 +164,10 @@ impl<const D: usize> Layer<D> {
         parallel::over(self.distance.len(), SHARE, &|node| {
             if self.is_near(node) {
                 find(node);
-                let place = self.stored.place(node);
+                let place = self.stored.multi_index(node);
                 for axis in 0..D {
                     let around = self.stored.along(node, place, axis, STEPS);
-                    around.into_iter().flatten().for_each(find);
+                    around.into_iter().filter_map(Lookup::stored).for_each(find);
                 }
             }
         });
@@ -193,8 +198,10 @@ impl<const D: usize> Layer<D> {
     /// The neighbours of the nodes of the layer. Not to be called first in a loop on all cores: all of them make
     /// the table, and one that waits for another inside the loop may take up work that waits for the table.
     pub(super) fn around(&self) -> &[Around<D>] {
-        let place_of =
-            |neighbour: Result<usize, bool>| neighbour.map_or(NOWHERE, |node| self.places[node]);
+        let place_of = |neighbour: Lookup| match neighbour {
+            Lookup::Stored(node) => self.places[node],
+            Lookup::Pure { .. } => NOWHERE,
+        };
         self.around
             .get_or_init(|| self.map(|place| self.by_axis(place, |along| along.map(place_of))))
     }
@@ -204,8 +211,8 @@ impl<const D: usize> Layer<D> {
         let weights = self.weights();
         self.by_axis(place, |along| {
             let distances = along.map(|neighbour| match neighbour {
-                Ok(node) => self.distance[node],
-                Err(phase) => self.rests[usize::from(phase)],
+                Lookup::Stored(node) => self.distance[node],
+                Lookup::Pure { positive } => self.pure_distances[usize::from(positive)],
             });
             let terms = weights.iter().zip(distances);
             terms.fold(0.0, |sum, (weight, d)| sum + weight * d)
@@ -213,13 +220,9 @@ impl<const D: usize> Layer<D> {
     }
 
     /// A function of the stored neighbours of a place along each axis, or of their phases where nothing is stored.
-    fn by_axis<T>(
-        &self,
-        place: usize,
-        of: impl Fn([Result<usize, bool>; NEIGHBOURS]) -> T,
-    ) -> [T; D] {
+    fn by_axis<T>(&self, place: usize, of: impl Fn([Lookup; NEIGHBOURS]) -> T) -> [T; D] {
         let node = self.nodes[place] as usize;
-        let at = self.stored.place(node);
+        let at = self.stored.multi_index(node);
         std::array::from_fn(|axis| of(self.stored.along(node, at, axis, STEPS)))
     }
 
@@ -272,7 +275,7 @@ impl<const D: usize> Layer<D> {
                 f64::from(d < 0.0)
             }
         };
-        let outside = self.stored.outside().into_iter().zip(self.rests);
+        let outside = self.stored.outside().into_iter().zip(self.pure_distances);
         let outside = outside.map(|(nodes, d)| if d < 0.0 { nodes as f64 } else { 0.0 });
         let stored = parallel::sum(self.distance.len(), inside);
         self.grid.cell_volume() * (stored + outside.sum::<f64>())

@@ -62,7 +62,7 @@ impl<const D: usize> Sizes<D> {
         self.gradient(self.volume_by_distance())
     }
 
-    /// The mean curvature `k` at the nodes with a weight, zero elsewhere.
+    /// The mean curvature `kappa` at the nodes with a weight, zero elsewhere.
     pub fn mean_curvature(&self) -> Vec<f64> {
         let (around, normals) = (self.layer.around(), self.layer.normals());
         self.spread(self.layer.map(|place| match self.layer.near(place) {

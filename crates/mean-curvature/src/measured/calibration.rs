@@ -55,7 +55,7 @@ pub fn calibrate<const D: usize>(
         let mut bench = Bench {
             derivative: Derivative::new(step, [cells; D], 1.0, device)?,
             eps,
-            time_step: scales.time_step / scales.spacing.powi(2),
+            mcf_step: scales.mcf_step / scales.spacing.powi(2),
             tolerance: CONVERGED.max(ROUNDINGS * device.epsilon()),
         };
         found.push(OfNormal {
@@ -99,7 +99,7 @@ fn smaller_box<const D: usize>(
 struct Bench<'a, const D: usize> {
     derivative: Derivative<'a, D>,
     eps: f64,
-    time_step: f64,
+    mcf_step: f64,
     tolerance: f64,
 }
 
@@ -209,12 +209,12 @@ impl<const D: usize> Bench<'_, D> {
             bending,
         };
         let [rising, falling] = pair.halves();
-        let (eps, time_step) = (self.eps, self.time_step);
+        let (eps, mcf_step) = (self.eps, self.mcf_step);
         Ok([
-            signed.modes(pair, rising, 1.0)?.interface(eps, time_step)?,
+            signed.modes(pair, rising, 1.0)?.interface(eps, mcf_step)?,
             signed
                 .modes(pair, falling, -1.0)?
-                .interface(eps, time_step)?,
+                .interface(eps, mcf_step)?,
         ])
     }
 
@@ -236,7 +236,7 @@ impl<const D: usize> Bench<'_, D> {
         let lifted = planes.lifted(slope);
         let straight = planes.means(&self.derivative.product(&lifted)?);
         let mut sum = Col::<f64>::zeros(planes.count());
-        for waves in planes.waves((2.0 * self.time_step).sqrt()) {
+        for waves in planes.waves((2.0 * self.mcf_step).sqrt()) {
             for (wave, weight) in waves.0.iter().zip(Waves::TO_ZERO) {
                 if !planes.tell(wave) {
                     return Err(Error::BoxTooSmall {

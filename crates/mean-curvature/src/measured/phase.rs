@@ -55,7 +55,7 @@ impl Symbols {
         let mut impulse = vec![0.0; cells.pow(D as u32)];
         impulse[0] = 1.0;
         let impulse = stored(&impulse);
-        let [negative, positive] = step.rests();
+        let [negative, positive] = step.phase_values();
         let mut derivative = Derivative::new(step, shape, positive, device)?;
         let positive = transform.forward(&in_rows(&derivative.product(&impulse)?));
         derivative.at(&vec![negative; impulse.len()])?;
@@ -217,7 +217,7 @@ impl AtRest {
         let pure = Bricks::new(bricks.cells(), bricks.side(), stored, |_| true)?;
         let step = put_on(step, &Nodes::on_bricks(*nodes.grid(), Arc::new(pure)))?;
         let options = (device.device(), device.dtype());
-        let point = Tensor::<D>::full(bricks.shape(), step.rests()[1], options);
+        let point = Tensor::<D>::full(bricks.shape(), step.phase_values()[1], options);
         let mut linearization = trace(&*step, &point, device)?;
         linearization.at(&[(&point).into()], &[])?;
         Ok(Self {

@@ -45,7 +45,8 @@ impl<const D: usize> Domain<D> {
         let fitting = "so few that they reach no further than the next brick";
         require("taps", taps.len() as f64, fitting, |_| fits)?;
         let neighbours = bricks.neighbours();
-        let outside = convolution_of_outside::<D>(bricks.side(), &neighbours, taps, self.rests());
+        let outside =
+            convolution_of_outside::<D>(bricks.side(), &neighbours, taps, self.phase_values());
         let outside = self.constant(&outside, bricks.shape(), &device);
         Ok(self.product(u, taps, &neighbours) + outside)
     }
@@ -99,8 +100,8 @@ impl<const D: usize> Domain<D> {
     fn of_neighbours(&self, faces: Tensor<4>, bricks: &Bricks<D>, column: usize) -> Tensor<4> {
         let [count, outer, layers, inner] = faces.dims();
         let device = faces.device();
-        let rests = self.constant(&self.rests(), [2, 1, 1, 1], &device);
-        let rests = rests.expand([2, outer, layers, inner]);
+        let phase_values = self.constant(&self.phase_values(), [2, 1, 1, 1], &device);
+        let phase_values = phase_values.expand([2, outer, layers, inner]);
         let neighbours = bricks.neighbours();
         let numbers = neighbours.iter().skip(column).step_by(2 * D);
         // Behind the bricks lie the constants of the negative phase, -2 in the table, and of the positive one, -1.
@@ -110,7 +111,7 @@ impl<const D: usize> Domain<D> {
         };
         let places: Vec<i64> = numbers.map(place).collect();
         let places = Tensor::<1, Int>::from_data(TensorData::new(places, [count]), &device);
-        Tensor::cat(vec![faces, rests], 0).select(0, places)
+        Tensor::cat(vec![faces, phase_values], 0).select(0, places)
     }
 
     /// The Laplacian by central differences of eighth order, periodic. On bricks it is made of [convolutions](Self::convolve), in space up to
@@ -121,7 +122,7 @@ impl<const D: usize> Domain<D> {
         };
         let device = u.device();
         let form = BrickLaplacian::new(self, bricks);
-        let outside = self.constant(&form.outside(self.rests()), bricks.shape(), &device);
+        let outside = self.constant(&form.outside(self.phase_values()), bricks.shape(), &device);
         (form.products(u) + outside) * -form.scale
     }
 
@@ -133,11 +134,11 @@ impl<const D: usize> Domain<D> {
         };
         let form = BrickLaplacian::new(self, bricks);
         // The form has as much from the nodes outside as from what they add inside.
-        let outside = form.outside(self.rests());
+        let outside = form.outside(self.phase_values());
         let outside: Vec<f64> = outside.iter().map(|x| 2.0 * x).collect();
         let outside = self.constant(&outside, bricks.shape(), &u.device());
         // Near the edge of the bricks all nodes are in one phase, and second differences of constants vanish.
-        let squares = self.rests().map(|rest| rest * rest);
+        let squares = self.phase_values().map(|rest| rest * rest);
         let rest = -form.outside(squares).iter().sum::<f64>();
         let sum = form.products(u) + outside;
         ((u.clone() * sum).sum() + rest) * (form.scale * volume)
@@ -198,9 +199,10 @@ impl<'a, const D: usize> BrickLaplacian<'a, D> {
     }
 
     /// What these constants outside add to that.
-    fn outside(&self, rests: [f64; 2]) -> Vec<f64> {
-        let [minus, plus] = (self.taps)
-            .map(|taps| convolution_of_outside::<D>(self.side, &self.neighbours, &taps, rests));
+    fn outside(&self, phase_values: [f64; 2]) -> Vec<f64> {
+        let [minus, plus] = (self.taps).map(|taps| {
+            convolution_of_outside::<D>(self.side, &self.neighbours, &taps, phase_values)
+        });
         minus.iter().zip(&plus).map(|(a, b)| a - b).collect()
     }
 }

@@ -25,7 +25,7 @@ impl<const D: usize> Domain<D> {
             return Ok(0.0);
         };
         let mut total = 0.0;
-        for (phase, rest) in [false, true].into_iter().zip(self.rests) {
+        for (phase, rest) in [false, true].into_iter().zip(self.phase_values) {
             let places: Vec<usize> = (0..bricks.per_axis().pow(D as u32))
                 .filter(|flat| {
                     let place = bricks.place(*flat);
@@ -56,6 +56,6 @@ impl<const D: usize> Domain<D> {
         let (cells, side) = (bricks.cells(), bricks.side());
         let bricks = Bricks::new(cells, side, is_part, |_| positive)?;
         let nodes = Nodes::on_bricks(*self.grid(), Arc::new(bricks));
-        Ok(Self::new(nodes, self.rests, self.scales, &self.home))
+        Ok(Self::new(nodes, self.phase_values, self.scales, &self.home))
     }
 }

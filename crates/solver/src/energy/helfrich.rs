@@ -70,7 +70,7 @@ pub struct SpontaneousCurvature {
 
 impl<const D: usize> EnergyTerm<D> for SpontaneousCurvature {
     fn shift(&self, u: &Tensor<D>, on: &Domain<D>) -> Result<Option<Tensor<D>>, Error> {
-        let displacement = on.response() * on.inner_step() * self.c0;
+        let displacement = on.response() * on.mcf_step() * self.c0;
         Ok(Some(on.slope(u) * displacement))
     }
 

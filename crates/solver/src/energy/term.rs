@@ -61,7 +61,7 @@ pub trait EnergyTerm<const D: usize>: Send + Sync {
     }
 
     /// What is added to `V[u] - u` before it is squared, in the shape of `u`: `g tautilde kappa_0 q'`, with the [response](Domain::response) `g`, the
-    /// [inner step](Domain::inner_step) `tautilde` and the [slope](Domain::slope) `q'`, makes `kappa_0` the curvature that costs nothing. It has to
+    /// [inner step](Domain::mcf_step) `tautilde` and the [slope](Domain::slope) `q'`, makes `kappa_0` the curvature that costs nothing. It has to
     /// vanish in the pure phases.
     fn shift(&self, _u: &Tensor<D>, _on: &Domain<D>) -> Result<Option<Tensor<D>>, Error> {
         Ok(None)

@@ -44,7 +44,7 @@ pub fn scales<const D: usize>(grid: &Grid<D>) -> DomainScales {
     let FlowParams { eps, mcf_step, .. } = params(grid);
     DomainScales {
         eps,
-        inner_step: mcf_step,
+        mcf_step,
         response: 1.0,
     }
 }
