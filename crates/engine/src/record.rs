@@ -44,7 +44,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// The Willmore energy as the scheme measures it.
+    /// The energy as the scheme measures it: that of bending, and all terms that the flow has besides.
     pub fn willmore_energy(&self) -> Option<f64> {
         self.minimization.map(|made| made.willmore_energy)
     }

@@ -8,7 +8,7 @@ use geometry::measure::l2_distance;
 use geometry::{Field, NodeSet, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
-use solver::{Candidate, Problem, Scheme, State, StepSize};
+use solver::{Candidate, Domain, Problem, Scheme, State, StepSize, TermCheck};
 
 use crate::parts::{self, Parts};
 use crate::record::Values;
@@ -297,6 +297,19 @@ impl<const D: usize> Run<D> {
     /// The present time.
     pub fn time(&self) -> f64 {
         self.records.last().map_or(0.0, |last| last.time)
+    }
+
+    /// The stored nodes now, as the terms of the energy see them.
+    pub fn domain(&self) -> Domain<D> {
+        self.problem.domain(self.state.field.nodes())
+    }
+
+    /// The terms of the energy at the present phase field: their energies, and Taylor tests of their derivatives.
+    ///
+    /// # Errors
+    /// [`Error::Solver`]: what the terms raise.
+    pub fn check_terms(&self) -> Result<Vec<TermCheck>, Error> {
+        Ok(self.problem.check_derivatives(&self.state.field)?)
     }
 
     /// How many cells of the phase field are stored now: all of the grid, or those of the bricks near the surface.

@@ -10,9 +10,11 @@ use operators::ComputeDevice;
 
 use crate::{Domain, DomainScales, Error, Precision};
 
+pub(crate) mod check;
 mod helfrich;
 mod term;
 
+pub use check::TermCheck;
 pub use helfrich::{Helfrich, Pressure, SpontaneousCurvature, Tension};
 pub use term::{EnergyTerm, EnergyTerms};
 
@@ -66,7 +68,7 @@ pub struct MovementGraph<'a, const D: usize> {
 /// so that its Hessian is the identity (or mass matrix) plus what the curvature adds. The shifts `b` and energies `e` are those of the
 /// [terms](EnergyTerm), if there are such. The anchor `a` is `u_k` in an implicit Euler step.
 /// Stages of second-order steps have other anchors, and weigh the motion by positive numbers that are fixed during the minimization:
-/// `1/2 |s (u - a)|^2`. Anchor, `c` and `s` are inputs of the traced graph: one trace serves a whole run.
+/// `1/2 |s (u - a)|^2`. Anchor, `c` and `s` are inputs of the traced graph: one trace serves until the stored nodes or the problem change.
 pub struct MinimizingMovement<const D: usize> {
     linearization: Linearization,
     product_dtype: Option<DType>,
@@ -79,7 +81,7 @@ pub struct MinimizingMovement<const D: usize> {
 }
 
 impl<const D: usize> MovementGraph<'_, D> {
-    /// The energy at the inputs of a graph: `u` of the anchor, the stiffness, and the factors if the motion is weighted.
+    /// The energy at the inputs of a graph. Its variable is `u`; its parameters are the anchor, the stiffness, and the factors if the motion is weighted.
     fn energy(&self, inputs: &Inputs) -> Result<Tensor<1>, Error> {
         let u = inputs.variable::<D>(0);
         let mut motion = u.clone() - inputs.parameter::<D>(0);
@@ -98,21 +100,12 @@ impl<const D: usize> MovementGraph<'_, D> {
     }
 
     /// The error of linearizing, with the name of the term that contains an operation without a rule, if one does.
-    fn error(&self, error: linearize::Error, u: &Value, extensions: &Extensions) -> Error {
+    fn error(&self, error: linearize::Error, extensions: &Extensions) -> Error {
         if !matches!(error, linearize::Error::NoRule { .. }) {
             return error.into();
         }
         for term in self.terms {
-            let graph = graph_of(std::slice::from_ref(u), &[], |inputs| {
-                let u = inputs.variable::<D>(0);
-                let domain = self.domain.at(&u.device());
-                let parts = [
-                    term.energy(&u, &domain)?,
-                    term.shift(&u, &domain)?.map(Tensor::sum),
-                ];
-                let sum = parts.into_iter().flatten().reduce(|a, b| a + b);
-                Ok(sum.unwrap_or_else(|| u.sum()))
-            });
+            let graph = check::graph_of_term(&**term, self.domain);
             let alone = graph.map(|graph| graph.linearize(extensions, None));
             if let Ok(Err(source)) = alone {
                 let name = term.identity().name;
@@ -189,7 +182,7 @@ impl<const D: usize> MinimizingMovement<D> {
         let single = graph.products == Precision::Single && graph.step.allows_single_precision();
         let product_dtype = (single && device.dtype() != DType::F32).then_some(DType::F32);
         let program = (energy.linearize(&extensions, product_dtype))
-            .map_err(|error| graph.error(error, &anchor, &extensions))?;
+            .map_err(|error| graph.error(error, &extensions))?;
         Ok(Self {
             linearization: program.on(device.device(), &extensions)?,
             product_dtype,

@@ -80,6 +80,18 @@ pub enum Error {
         name: String,
         source: linearize::Error,
     },
+    #[error(
+        "the term `{name}` of the energy has tensors of shape {found:?} where the phase field has {expected:?}; make densities and shifts node by node"
+    )]
+    TermShape {
+        name: String,
+        found: Vec<usize>,
+        expected: Vec<usize>,
+    },
+    #[error(
+        "the term `{name}` of the energy has no finite derivative {place}; a root or a logarithm needs an offset there, as in `Domain::area`"
+    )]
+    TermDerivative { name: String, place: &'static str },
     #[error(transparent)]
     Model(#[from] model::Error),
     #[error(transparent)]

@@ -76,7 +76,7 @@ pub use displacement::widths_between;
 pub use domain::{Domain, DomainScales};
 pub use energy::{
     EnergyTerm, EnergyTerms, Helfrich, MinimizingMovement, MovementGraph, Objective, Pressure,
-    SpontaneousCurvature, Tension,
+    SpontaneousCurvature, Tension, TermCheck,
 };
 pub use error::Error;
 pub use euler::Euler;

@@ -36,7 +36,6 @@ impl<const D: usize> Movement<D> {
         let factors = self.factors.as_ref();
         Ok(Self {
             anchor: self.anchor.on(nodes)?,
-            // Where nothing moves, factors of the motion are near 1 or, which is the same, near -1.
             factors: factors.map(|factors| factors.on(nodes)).transpose()?,
             start: start.on(nodes)?,
             ..*self

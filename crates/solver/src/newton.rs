@@ -93,7 +93,7 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     times: Cell<PhaseTimes>,
 }
 
-/// Minimizes `objective`, whose fidelity term is centred at `previous`, from `start`.
+/// Minimizes `objective` from `start`. `previous` is the phase field before the step, from which the motion counts; it is the start if that is better.
 ///
 /// # Errors
 /// [`Error::Geometry`]; [`Error::NonFinite`] (with step 0: the caller knows the number) if the start has no finite energy;
@@ -166,21 +166,21 @@ pub(crate) fn minimize_timed<const D: usize>(
         Method::Paper => minimizer.paper()?,
     };
     (minimizer.info.exit, minimizer.info.energy) = (exit, energy);
-    // Adding nothing makes 0.0 of -0.0.
-    let u = minimizer.hold(minimizer.found(&u, true)?.u);
+    // Restoring adds nothing to values outside of the region, which makes 0.0 of -0.0: they are put back.
+    let u = minimizer.keep_outside(minimizer.found(&u, true)?.u);
     Ok((u, minimizer.info, minimizer.times.get()))
 }
 
 impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     /// `u` with the values that may not change put back, where there are such.
-    fn hold(&self, u: Tensor<D>) -> Tensor<D> {
+    fn keep_outside(&self, u: Tensor<D>) -> Tensor<D> {
         Region::hold(self.region, u, self.previous)
     }
 
     /// The phase field near `u` at which the energy counts; none if nothing near it fulfils the constraints.
     fn place(&self, u: Tensor<D>) -> Result<Option<Place<D>>, Error> {
         match &self.held {
-            Some(held) => held.restored(u, false, |u| self.hold(u)),
+            Some(held) => held.restored(u, false, |u| self.keep_outside(u)),
             None => Ok(Some(Place { u, tangent: None })),
         }
     }
@@ -191,7 +191,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         let Some(held) = &self.held else {
             return Ok(Place { u, tangent });
         };
-        match held.restored(u.clone(), exactly, |u| self.hold(u))? {
+        match held.restored(u.clone(), exactly, |u| self.keep_outside(u))? {
             Some(place) => Ok(place),
             None => Err(held.lost(&u)?),
         }
@@ -372,29 +372,9 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         Ok(None)
     }
 
+    /// Newton's method with the preconditioner, from the better of `start` and the previous phase field.
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
-        const HOPELESS: f64 = 50.0;
-        const SHORTEST: f64 = 0.02;
-        let place = match self.place(self.hold(start.clone()))? {
-            Some(place) => place,
-            None => self.found(self.previous, false)?,
-        };
-        let mut point = self.point(place)?;
-        if !point.energy.is_finite() {
-            return Err(Error::non_finite(0, "energy of the start"));
-        }
-        point = self.clean(point)?;
-        if point.energy > self.info.energy_before {
-            // An extrapolation that made things worse is dropped. Where a target moves, so does the energy of standing still.
-            let rest = self.point(self.found(self.previous, false)?)?;
-            point = if rest.energy < point.energy {
-                rest
-            } else {
-                // The objective's own point is that of rest by now.
-                let Point { u, tangent, .. } = point;
-                self.point(Place { u, tangent })?
-            };
-        }
+        let mut point = self.better_start(start)?;
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;
             let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
@@ -408,43 +388,15 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 timed(&self.times, |t| &mut t.assembly, follow)?;
             }
             let solution = self.solve(&point, limits, Level::Both)?;
-            let sign = -solution.slope.signum();
             let decrease = solution.slope.abs();
             // No search finds a decrease below the rounding of the energy.
             let lost = !solution.negative_curvature && decrease <= self.noise(point.energy);
-            let lost = lost.then_some(Exit::Precision);
-            let done = self.converged(motion, solution.slope).or(lost);
+            let done = self.converged(motion, solution.slope);
             self.info.newton += 1;
-            if let Some(exit) = done {
-                let u = retract(&point.u, &solution.direction, sign);
-                let mut end = (point.u, point.energy);
-                if let Some(place) = self.place(self.hold(u))? {
-                    let energy = self.energy(&place)?;
-                    // What rounding alone says against the step does not count.
-                    let rounding = lost.map_or(0.0, |_| self.noise(end.1));
-                    if energy <= end.1 + rounding {
-                        end = (place.u, energy);
-                    }
-                }
-                return Ok((exit, end));
+            if let Some(exit) = done.or(lost.then_some(Exit::Precision)) {
+                return Ok((exit, self.last_step(point, &solution, lost)?));
             }
-            let mut t = 1.0;
-            let mut next = None;
-            while t >= SHORTEST {
-                let u = retract(&point.u, &solution.direction, sign * t);
-                let candidate = self.trial(self.hold(u))?;
-                if let Some(candidate) =
-                    candidate.filter(|c| c.energy < HOPELESS * point.energy.abs())
-                {
-                    let candidate = self.clean(candidate)?;
-                    if candidate.energy <= point.energy - 1e-3 * t * decrease {
-                        next = Some(candidate);
-                        break;
-                    }
-                }
-                t *= 0.4;
-            }
-            point = match next {
+            point = match self.along_the_profile(&point, &solution)? {
                 Some(next) => next,
                 None => match self.straight(&point, &solution, 1.0, 1e-6, 1e-4)? {
                     Some((place, _)) => self.point(place)?,
@@ -456,6 +408,73 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             };
         }
         Ok((Exit::IterationLimit, (point.u, point.energy)))
+    }
+
+    /// The start with a clean profile, or the previous phase field if the energy is lower there.
+    fn better_start(&mut self, start: &Tensor<D>) -> Result<Point<D>, Error> {
+        let place = match self.place(self.keep_outside(start.clone()))? {
+            Some(place) => place,
+            None => self.found(self.previous, false)?,
+        };
+        let point = self.point(place)?;
+        if !point.energy.is_finite() {
+            return Err(Error::non_finite(0, "energy of the start"));
+        }
+        let point = self.clean(point)?;
+        if point.energy <= self.info.energy_before {
+            return Ok(point);
+        }
+        // Where a target moves, so does the energy of standing still.
+        let previous = self.point(self.found(self.previous, false)?)?;
+        if previous.energy < point.energy {
+            return Ok(previous);
+        }
+        // The objective's own point is the previous one by now.
+        let Point { u, tangent, .. } = point;
+        self.point(Place { u, tangent })
+    }
+
+    /// The whole of the last Newton step if it does not raise the energy, by more than rounding where that is `lost` in it.
+    fn last_step(
+        &mut self,
+        point: Point<D>,
+        solution: &CgSolution<D>,
+        lost: bool,
+    ) -> Result<(Tensor<D>, f64), Error> {
+        let u = retract(&point.u, &solution.direction, -solution.slope.signum());
+        if let Some(place) = self.place(self.keep_outside(u))? {
+            let energy = self.energy(&place)?;
+            let rounding = if lost { self.noise(point.energy) } else { 0.0 };
+            if energy <= point.energy + rounding {
+                return Ok((place.u, energy));
+            }
+        }
+        Ok((point.u, point.energy))
+    }
+
+    /// Backtracks along motions that keep the profile, each of which is cleaned before its energy counts.
+    fn along_the_profile(
+        &mut self,
+        point: &Point<D>,
+        solution: &CgSolution<D>,
+    ) -> Result<Option<Point<D>>, Error> {
+        const HOPELESS: f64 = 50.0;
+        const SHORTEST: f64 = 0.02;
+        let (sign, decrease) = (-solution.slope.signum(), solution.slope.abs());
+        let mut t = 1.0;
+        while t >= SHORTEST {
+            let u = retract(&point.u, &solution.direction, sign * t);
+            let trial = self.trial(self.keep_outside(u))?;
+            if let Some(trial) = trial.filter(|trial| trial.energy < HOPELESS * point.energy.abs())
+            {
+                let trial = self.clean(trial)?;
+                if trial.energy <= point.energy - 1e-3 * t * decrease {
+                    return Ok(Some(trial));
+                }
+            }
+            t *= 0.4;
+        }
+        Ok(None)
     }
 
     /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.

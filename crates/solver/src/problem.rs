@@ -6,9 +6,10 @@ use burn::tensor::Tensor;
 use geometry::{Bricks, Field, Grid, NodeSet, Nodes, PhaseField, Stored, require};
 use operators::ComputeDevice;
 
+use crate::energy::check;
 use crate::{
     DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held, MeanCurvatureStep,
-    State, StepScales, bricks,
+    State, StepScales, TermCheck, bricks,
 };
 
 /// The side of the smallest bricks.
@@ -185,13 +186,20 @@ impl<const D: usize> Problem<D> {
             Ok(brick) => Nodes::on_bricks(self.grid, Arc::new(brick)),
             Err(_) => self.grid.into(),
         };
-        let domain = self.domain(&nodes);
-        let u = domain.sample(|_| 0.0);
-        for term in terms {
-            term.density(&u, &domain)?;
-            term.shift(&u, &domain)?;
-        }
-        Ok(())
+        let (domain, extensions) = (self.domain(&nodes), self.operator.extensions());
+        let mut terms = terms.iter();
+        terms.try_for_each(|term| check::fits(&**term, &domain, &extensions))
+    }
+
+    /// Taylor tests of the terms of the energy at a phase field, in their order.
+    ///
+    /// # Errors
+    /// What the terms raise, [`Error::Operators`] if the device fails.
+    pub fn check_derivatives(&self, u: &DeviceField<D>) -> Result<Vec<TermCheck>, Error> {
+        let (domain, extensions) = (self.domain(u.nodes()), self.operator.extensions());
+        let checks = self.terms.iter();
+        let checks = checks.map(|term| check::check(&**term, u.values(), &domain, &extensions));
+        checks.collect()
     }
 
     /// Lets every step of Euler's method begin with the motion that `half`, the problem on the grid of every other node, makes in that step. A step that cannot be

@@ -74,7 +74,7 @@ impl<const D: usize> SecondOrder<D> {
             from,
             Movement {
                 anchor: problem.upload(stage.anchor),
-                factors: Some(problem.upload(&factors)),
+                factors: Some(DeviceField::upload(&factors, &problem.device)),
                 start: problem.upload(stage.start),
                 tau: stage.tau,
                 targets: stage.targets,

@@ -85,7 +85,12 @@ fn field<const D: usize>(grid: Grid<D>, shape: &impl SignedDistance<D>) -> Field
 }
 
 pub fn cross() -> Field<2> {
-    let grid = Grid::per_unit(128, 2.0).unwrap();
+    cross_of(128)
+}
+
+/// With so many cells per unit.
+pub fn cross_of(cells: usize) -> Field<2> {
+    let grid = Grid::per_unit(cells, 2.0).unwrap();
     field(grid, &Cross::new(0.8, 0.27).unwrap())
 }
 

@@ -1,9 +1,11 @@
 //! The operations of a domain, on the whole grid and on bricks.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use geometry::{Bricks, Error, Field, Grid, Nodes, Stored};
+use geometry::shapes::Ball;
+use geometry::{Bricks, Error, Field, Grid, Nodes, Stored, phase_field};
 use solver::Domain;
 
 use crate::common::{device, dot, noise, scales, values};
@@ -102,6 +104,7 @@ fn agreement<const D: usize>(cells: usize, laplacian: f64) {
         narrow.agree(|_, on| on.coordinates()[axis].clone(), rounding);
     }
     narrow.agree(|u, on| on.slope(u) + on.inside(u), rounding);
+    narrow.agree(|u, on| on.area(u), rounding);
     narrow.agree(|_, on| on.sample(|x| x.iter().sum::<f64>().sin()), rounding);
     // Passes along the axes end at the edge of the bricks.
     let taps = [0.2, 0.5, 0.1, -0.3, 0.05];
@@ -175,4 +178,24 @@ fn taps_that_do_not_fit_are_refused() {
     assert!(few.to_string().contains("next brick"), "{few}");
     let whole = both.whole.convolve(&both.on_grid, &[0.5; 2]).unwrap_err();
     assert!(whole.to_string().contains("odd"), "{whole}");
+}
+
+fn area_of_a_ball<const D: usize>(cells: usize, exact: f64) {
+    let grid = Grid::<D>::centred(cells, 1.0).unwrap();
+    let scales = scales(&grid);
+    let on = Domain::new(grid.into(), [-1.0, 1.0], scales, &device());
+    let ball = Ball::new([0.0; D], RADIUS).unwrap();
+    let ball = phase_field(grid, &ball, scales.eps).unwrap();
+    let u = device().tensor(ball.values(), grid.shape());
+    let area = device().scalar(on.area(&u).sum()).unwrap() * on.cell_volume();
+    let error = area / exact - 1.0;
+    println!("{error:.1e}");
+    // Level sets of a sphere are larger on average, by the second moment of the profile.
+    assert!(error.abs() < 5e-3, "{area} {exact}");
+}
+
+#[test]
+fn areas_are_those_of_the_zero_set() {
+    area_of_a_ball::<2>(128, 2.0 * PI * RADIUS);
+    area_of_a_ball::<3>(64, 4.0 * PI * RADIUS * RADIUS);
 }

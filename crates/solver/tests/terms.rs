@@ -12,11 +12,16 @@ use solver::{
     MovementGraph, Objective, Precision, Pressure, StartKind, Tension,
 };
 
-use crate::bricks::{bricks, cross, dense, dented, difference_of, exact, holding, usual};
+use crate::bricks::{bricks, cross_of, dense, dented, difference_of, exact, holding, usual};
 use crate::common::flow::Flow;
 use crate::common::{accurate, device, dot, noise, params, passes_taylor_tests, values};
 use crate::domain::Both;
 use crate::start;
+
+/// Coarser than that of other tests, since the preconditioner does not know own terms.
+fn cross() -> Field<2> {
+    cross_of(64)
+}
 
 /// `int g (x_D + 1)` over the inside.
 struct Gravity {
@@ -381,8 +386,81 @@ impl EnergyTerm<2> for Product {
 fn a_term_without_a_rule_is_named() {
     let mut flow = start::flow(false);
     let terms: EnergyTerms<2> = vec![Arc::new(Gravity { g: 1.0 }), Arc::new(Product)];
-    flow.set_energy(terms, 1.0).unwrap();
-    let error = flow.advance(start::TAU).unwrap_err();
+    let error = flow.set_energy(terms, 1.0).unwrap_err();
     assert!(error.to_string().contains("`my product`"), "{error}");
     assert!(matches!(error, Error::Term { .. }), "{error}");
+}
+
+/// A density that is a function.
+struct Of<const D: usize>(fn(&Tensor<D>, &Domain<D>) -> Tensor<D>);
+
+impl<const D: usize> EnergyTerm<D> for Of<D> {
+    fn density(&self, u: &Tensor<D>, on: &Domain<D>) -> Result<Option<Tensor<D>>, Error> {
+        Ok(Some((self.0)(u, on)))
+    }
+
+    fn identity(&self) -> Identity {
+        Identity::new("of a function", json!(null))
+    }
+}
+
+fn refusal(density: fn(&Tensor<2>, &Domain<2>) -> Tensor<2>) -> Error {
+    let mut flow = start::flow(false);
+    let refused = flow.set_energy(vec![Arc::new(Of(density))], 1.0);
+    let error = refused.unwrap_err();
+    assert!(error.to_string().contains("`of a function`"), "{error}");
+    error
+}
+
+#[test]
+fn densities_of_another_shape_are_refused() {
+    let error = refusal(|u, on| on.inside(u).sum().reshape([1, 1]));
+    assert!(matches!(error, Error::TermShape { found, .. } if found == [1, 1]));
+}
+
+#[test]
+fn densities_without_a_derivative_in_the_phases_are_refused() {
+    let length = |u: &Tensor<2>, on: &Domain<2>| {
+        let squares = on.gradient(u).map(|slope| slope.clone() * slope);
+        squares.into_iter().reduce(|a, b| a + b).unwrap().sqrt()
+    };
+    let logarithm = |u: &Tensor<2>, _: &Domain<2>| (u.clone() + 1.0).log();
+    let densities: [fn(&Tensor<2>, &Domain<2>) -> Tensor<2>; 2] = [length, logarithm];
+    for density in densities {
+        let error = refusal(density);
+        assert!(matches!(error, Error::TermDerivative { .. }), "{error}");
+    }
+}
+
+/// The factor of the density is constant across the interface.
+#[test]
+fn areas_with_a_factor_do_not_depend_on_what_is_stored_and_bend_no_profile() {
+    let tilted: fn(&Tensor<2>, &Domain<2>) -> Tensor<2> =
+        |u, on| on.area(u) * ((on.coordinate(1) * 2.0).sin() + 1.0) * 40.0;
+    let start = cross();
+    let (params, tau) = (exact(start.grid()), params(start.grid()).mcf_step / 4.0);
+    let mut flows = (dense(&start, params), bricks(&start, params));
+    for flow in [&mut flows.0, &mut flows.1] {
+        flow.set_energy(vec![Arc::new(Of(tilted))], 1.0).unwrap();
+    }
+    let (apart, energies) = difference_of((&mut flows.0, &mut flows.1), &[tau; 2]);
+    assert!(apart < 1e-5 && energies < 1e-5, "{apart:e} {energies:e}");
+}
+
+#[test]
+fn terms_are_checked_by_taylor_tests() {
+    let mut flow = bricks(&cross(), usual(cross().grid()));
+    flow.set_energy(everything(), 1.0).unwrap();
+    let checks = flow.problem.check_derivatives(&flow.state.field).unwrap();
+    let names: Vec<&str> = checks.iter().map(|check| &*check.name).collect();
+    assert_eq!(
+        names,
+        ["gravity", "anisotropic tension", "everything", "tension"]
+    );
+    for check in &checks {
+        assert!(check.is_consistent(), "{check:?}");
+        assert!(check.energy.is_some());
+    }
+    assert!((checks[0].gradient.rate().unwrap() - 2.0).abs() < 0.1);
+    assert!((checks[0].hessian.rate().unwrap() - 3.0).abs() < 0.1);
 }

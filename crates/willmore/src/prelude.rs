@@ -26,8 +26,8 @@ pub use runs::{Interrupt, RunDirectory};
 pub use serde_json::json;
 pub use solver::{
     Candidate, DeviceField, Domain, EnergyTerm, Euler, FlowParams, Held, Helfrich,
-    MeanCurvatureFlow, Memory, Minimizations, Movement, NewtonParams, Pressure, Problem, Scheme,
-    SecondOrder, SpontaneousCurvature, State, StepEstimates, StepRecord, StepSize, Stepper, Target,
-    Tension, widths_between,
+    MeanCurvatureFlow, Memory, Minimizations, Movement, NewtonParams, Precision, Pressure, Problem,
+    Scheme, SecondOrder, SpontaneousCurvature, State, StepEstimates, StepRecord, StepSize, Stepper,
+    Target, Tension, TermCheck, widths_between,
 };
 pub use solver::{DomainScales, Error as StepError};
