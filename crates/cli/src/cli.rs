@@ -6,7 +6,7 @@ use std::io::Write;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use engine::Storage;
-use report::Progress;
+use report::ProgressBars;
 
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -585,8 +585,8 @@ impl MessageOptions {
         }
     }
 
-    pub fn progress(self) -> Progress {
-        Progress::new(self.quiet || self.json || self.to_pipe)
+    pub fn progress(self) -> ProgressBars {
+        ProgressBars::new(self.quiet || self.json || self.to_pipe)
     }
 }
 

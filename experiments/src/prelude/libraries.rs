@@ -23,7 +23,7 @@ pub use operators::{ComputeDevice, DeviceKind, memory};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
 pub use report::{
     Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, Numbers,
-    OutputDir, Progress, Raster, Series, Shapes, Sheet,
+    OutputDir, ProgressBars, Raster, Series, Shapes, Sheet,
 };
 pub use serde::Serialize;
 pub use serde_json::{Value, json};
