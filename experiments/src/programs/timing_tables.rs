@@ -3,7 +3,7 @@ use crate::prelude::*;
 use crate::{surfaces, timing};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
-use solver::Method::{self as Newton, Paper, Preconditioned};
+use solver::NewtonVariant::{self, Paper, Preconditioned};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "timing_tables",
@@ -102,7 +102,7 @@ struct Variant {
     key: &'static str,
     label: &'static str,
     method: Method,
-    newton: Newton,
+    newton: NewtonVariant,
     linear: LinearSolver,
     /// What the paper reports for 128 steps at n = 256 and 512, in seconds: hybrid on one A100, finite elements (sparse direct
     /// solver) on 64 cores.
@@ -258,7 +258,7 @@ fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> R
         operator.half_grids = false;
         operator.linear = row.linear;
         let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
-        case.scales.newton.method = row.newton;
+        case.scales.newton.variant = row.newton;
         contenders.push(Timing {
             row,
             n,
