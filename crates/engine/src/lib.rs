@@ -43,13 +43,12 @@
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
-mod advance;
 mod case;
-mod control;
 mod controller;
 mod current;
 mod edges;
 mod error;
+mod error_control;
 mod flow;
 mod measure;
 mod observer;
@@ -59,19 +58,20 @@ mod parts;
 mod record;
 mod run;
 mod step_control;
-mod steps;
 mod stop;
 mod storage;
 mod store;
 mod substeps;
+mod time_steps;
 mod trajectory;
+mod until_stop;
 
 pub use case::Case;
-pub use control::ErrorControl;
 pub use controller::{Attempts, Controller, EqualSteps, Verdict};
 pub use current::Current;
 pub use edges::round_edges;
 pub use error::Error;
+pub use error_control::ErrorControl;
 pub use flow::Flow;
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
@@ -83,8 +83,8 @@ pub use record::{
 pub use run::Run;
 pub use solver::{Held, Helfrich, Target};
 pub use step_control::StepControl;
-pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::{Progress, Stop, StopRule};
 pub use storage::Storage;
 pub use store::{Checkpoints, METRICS, Store, TIMINGS, dimension, ended, initial, notes, records};
+pub use time_steps::{Order, StepRule, TimeSteps};
 pub use trajectory::Trajectory;
