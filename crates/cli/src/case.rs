@@ -7,7 +7,7 @@ use solver::NewtonParams;
 use crate::cli::{
     CommonOptions, FlowOptions, MessageOptions, RunCommand, RunOptions, SchemeOptions,
 };
-use crate::input::{Start, usual_box};
+use crate::input::{InitialShape, usual_box};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -127,7 +127,7 @@ impl RunCommand {
     /// The flow from a start, and how that is shown; the rule for the time steps is filled in.
     pub fn case<const D: usize, O: Presentation<D>>(
         &mut self,
-        start: Start<D, O>,
+        start: InitialShape<D, O>,
     ) -> Result<(Case<D>, O)> {
         let (flow, method) = match self {
             Self::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),

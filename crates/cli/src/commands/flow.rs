@@ -5,7 +5,7 @@ use engine::{Flow, Storage, Store};
 use crate::case::with_round_edges;
 use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
-use crate::input::{Loaded, Reader, Start};
+use crate::input::{InitialShape, Loaded, Reader};
 use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
@@ -147,7 +147,10 @@ struct Job {
 }
 
 impl Job {
-    fn start<const D: usize, O: Presentation<D>>(mut self, mut start: Start<D, O>) -> Result<()> {
+    fn start<const D: usize, O: Presentation<D>>(
+        mut self,
+        mut start: InitialShape<D, O>,
+    ) -> Result<()> {
         let options = self.command.options();
         start.presentation.turn(&mut options.up)?;
         options.save.as_deref().map_or(Ok(()), O::check_saved)?;
@@ -199,7 +202,7 @@ impl Job {
         })?;
         let (initial, region) = engine::initial(&stored)?;
         presentation.restore(&stored)?;
-        let (case, presentation) = self.command.case(Start {
+        let (case, presentation) = self.command.case(InitialShape {
             name,
             initial,
             presentation,
