@@ -345,11 +345,11 @@ impl Comparison<'_> {
         session.csv(errors, "errors")?;
         let compared = self.runs.iter().map(|run| (run, "false"));
         let all = compared.chain(self.references.iter().map(|run| (run, "true")));
-        let steps = all.flat_map(|run| steps::of(run, &run.0.trajectory));
+        let steps = all.flat_map(|run| step_table::rows(run, &run.0.trajectory));
         let steps: Vec<_> = steps.collect();
         let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0.variant)
             .data("reference", |step| step.run.1);
-        session.csv(steps::columns(sheet, &steps), "steps")
+        session.csv(step_table::columns(sheet, &steps), "steps")
     }
 
     fn error_figure(&self) -> Figure {

@@ -170,7 +170,7 @@ pub fn finish<const D: usize>(
     let energies = Figure::new("Willmore energy while inpainting", 2).with_panels(energies);
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
-    steps::write(&session, "shape", runs)?;
+    step_table::write(&session, "shape", runs)?;
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {

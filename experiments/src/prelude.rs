@@ -12,4 +12,4 @@ pub use crate::networks::{
 pub use crate::options::{FigureOptions, RunOptions, distinct};
 pub use crate::session::{Session, Stage};
 pub use crate::study::{self, Study, StudyOptions, Variant};
-pub use crate::{harness, steps};
+pub use crate::{harness, step_table};

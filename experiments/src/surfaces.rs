@@ -398,7 +398,7 @@ impl Setting {
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
-        steps::write(&session, "surface", runs)?;
+        step_table::write(&session, "surface", runs)?;
         for one in &all {
             let records = &one.trajectory.records;
             let metrics = [

@@ -295,7 +295,7 @@ impl Report {
                 if e.variant.flow == Flow::Willmore {
                     // Without the beginning.
                     let run = (e.variant, circle.radius);
-                    steps.extend(steps::of(run, &circle.trajectory).skip(1));
+                    steps.extend(step_table::rows(run, &circle.trajectory).skip(1));
                 }
             }
         }
@@ -308,7 +308,7 @@ impl Report {
         session.csv(sheet, "circles")?;
         let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0);
         let sheet = sheet.data("radius", |step| step.run.1);
-        session.csv(steps::columns(sheet, &steps), "steps")
+        session.csv(step_table::columns(sheet, &steps), "steps")
     }
 
     /// The mean errors, and of Willmore flow the work.
