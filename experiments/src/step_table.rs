@@ -28,19 +28,22 @@ pub fn rows<R: Copy, const D: usize>(
         })
 }
 
-/// Writes the steps of runs by any names, with method and scheme, as `steps.csv`.
+/// Writes the steps of runs by any names, with method and formulation, as `steps.csv`.
 pub fn write<'a, const D: usize>(
     session: &Session,
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
 ) -> Result<()> {
     // Without the beginning.
-    let steps = runs.flat_map(|(name, run)| rows((name, &run.case.operator), run).skip(1));
+    let steps = runs.flat_map(|(name, run)| {
+        let discretization = run.case.operator.discretization;
+        rows((name, discretization), run).skip(1)
+    });
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)
         .text(named, |step| step.run.0)
         .text("method", |step| step.run.1.method.to_string())
-        .text("scheme", |step| step.run.1.scheme.to_string());
+        .text("scheme", |step| step.run.1.formulation.to_string());
     session.csv(columns(sheet, &steps), "steps")
 }
 

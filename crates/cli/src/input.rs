@@ -272,8 +272,9 @@ impl<'a> Reader<'a> {
             );
         }
         if let Some((device, flow)) = self.whole {
-            let needed = (grid.len(), Storage::bytes(flow, grid.len(), grid.len()));
-            Storage::check(device, &grid, needed, flow == Flow::Willmore)?;
+            let nodes = grid.len();
+            let needed = Storage::bytes(flow, nodes, nodes);
+            Storage::check(device, &grid, nodes, needed, flow == Flow::Willmore)?;
         }
         Ok(grid)
     }

@@ -95,7 +95,8 @@ impl Store {
         stored: StoredRun,
         case: Case<D>,
         device: &ComputeDevice,
-        (checkpoints, notes): (Checkpoints, Value),
+        checkpoints: Checkpoints,
+        notes: Value,
         ends: impl Fn(&str) -> bool,
     ) -> Result<(Self, Run<D>), Error> {
         let stops: Vec<Stop> = read(&stored, &stored.state().notes["case"]["stops"])?;

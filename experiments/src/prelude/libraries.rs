@@ -8,9 +8,9 @@ pub use std::time::Instant;
 
 pub use clap::{Args, Parser, ValueEnum};
 pub use engine::{
-    Case, ErrorControl, Flow, Held, Measure, Method, Operator, Order, Record, Run, Samples, Scales,
-    Scheme, StepRule, Stop, Storage, Target, TimeSteps, Trajectory, energy_increases, mean_hvp,
-    minimizations, total_hvp,
+    Case, Discretization, ErrorControl, Flow, Formulation, Held, Measure, Method, Operator, Order,
+    Record, Run, Samples, Scales, StepRule, Stop, Storage, Target, TimeSteps, Trajectory,
+    energy_increases, mean_hvp, minimizations, total_hvp,
 };
 pub use geometry::measure::{BoundingBox, l2_distance, zero_set_volume};
 pub use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Ellipse};

@@ -23,7 +23,9 @@ impl RunCommand {
             Self::Fair(fair) => fair.check()?,
             Self::Inpaint(inpaint) => inpaint.check()?,
             Self::Mcf(McfOptions { method, run }) => {
-                let chosen = run.scheme.network.is_some() || run.scheme.scheme != Scheme::Accurate;
+                let options = &run.operator;
+                let chosen =
+                    options.network.is_some() || options.formulation != Formulation::Accurate;
                 if chosen && !method.is_learned() {
                     refuse!(
                         "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
@@ -56,8 +58,8 @@ impl RunCommand {
 impl RunOptions {
     /// Reads the input, for Willmore flow on a device.
     pub fn reader(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Reader<'_>> {
-        let mut reader = Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)?;
-        let is_dense = self.scheme.storage == Some(Storage::Dense);
+        let mut reader = Reader::of(&mut self.input, self.operator.eps_over_h(), messages)?;
+        let is_dense = self.operator.storage == Some(Storage::Dense);
         reader.whole = is_dense.then_some((device, Flow::Willmore));
         Ok(reader)
     }
@@ -98,7 +100,7 @@ pub fn run(
         let steps = more.or(noted.map(|steps| steps as usize));
         options.steps = steps.or(options.steps);
     }
-    options.scheme.fill_in()?;
+    options.operator.fill_in()?;
     // That its folder is gone is no reason not to go on with a run.
     let is_gone = |save: &mut PathBuf| stored.is_some() && !save.parent().is_some_and(Path::is_dir);
     if let Some(save) = options.save.take_if(is_gone) {
@@ -216,9 +218,8 @@ impl Job {
                 if stored.is_finished() {
                     notes["was_over"] = true.into();
                 }
-                let with = (checkpoints, notes);
                 let ends = |name: &str| presentation::is_of_end(name, plan.extension());
-                Store::extend(stored, case, &self.device, with, ends)?
+                Store::extend(stored, case, &self.device, checkpoints, notes, ends)?
             }
             None => Store::resume(stored, case, &self.device, checkpoints)?,
         };

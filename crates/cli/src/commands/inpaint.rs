@@ -51,7 +51,7 @@ impl InpaintOptions {
                 grid.side()
             );
         }
-        let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
+        let eps = self.flow.run.operator.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
             Ansatz::Keep => field.clone(),
             Ansatz::Empty => Field::constant(grid, -1.0),
