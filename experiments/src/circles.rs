@@ -79,13 +79,15 @@ pub struct Ensemble {
 impl Ensemble {
     /// Runs `count` circles side by side for so many steps of `2^-14`; those of an interrupted run are in a `folder` of the output.
     pub fn run(
-        (variant, operator): &(Variant, Operator<2>),
-        (count, steps): (usize, usize),
+        planned: &Planned,
+        count: usize,
+        steps: usize,
         folder: &str,
         stage: &Stage<'_>,
     ) -> Result<Self> {
         let (device, folder) = (stage.device, stage.output.subfolder(folder)?);
         stage.bar.set_length(count as u64);
+        let Planned { variant, operator } = planned;
         let Variant { flow, n, .. } = *variant;
         let radii = radii(count);
         let circles = in_parallel(count, workers(device), |i| {
@@ -93,7 +95,7 @@ impl Ensemble {
             let exact = move |grid, time| exact(flow, radius, grid, time);
             let shape = format!("circle r = {radius:.4}");
             let (initial, last) = (exact(grid, 0.0)?, exact(grid, time(steps))?);
-            let mut case = planar_flow((flow, operator), &shape, initial, (STEP, steps));
+            let mut case = planar_flow(flow, operator, &shape, initial, STEP, steps);
             case.measures = Measure::size(EPS);
             case.measures.push(Measure::distance_to(exact));
             let name = format!("{flow}-n{n}-{}-{i:02}", operator.key());

@@ -3,7 +3,7 @@
 use geometry::measure::perimeter;
 
 use crate::prelude::*;
-use crate::truth::{CELLS, Reached, Sample, Truth};
+use crate::truth::{CELLS, Halves, Reached, Sample, Truth};
 
 /// The figures of every shape.
 pub const FIGURES: Figures = &[
@@ -146,6 +146,13 @@ struct Comparison<'a> {
     second_order: Vec<(String, Vec<Reached>)>,
 }
 
+/// What a run is compared with: a reference, unless it is the same one, and the exact flow.
+#[derive(Clone, Copy)]
+struct Yardsticks<'a> {
+    reference: Option<&'a Compared>,
+    exact: &'a [Truth],
+}
+
 fn compare(setting: &Setting, options: &Options) -> Result<()> {
     let (flow, quick, cells) = (setting.flow, options.study.run.quick, options.study.cells());
     let finest = cells.iter().copied().max().unwrap_or(0);
@@ -179,25 +186,36 @@ fn compare(setting: &Setting, options: &Options) -> Result<()> {
     let mut references: Vec<Compared> = Vec::new();
     for n in [Some(reference_n), halved].into_iter().flatten() {
         let what = ["reference: ", "for the reference's error: "][references.len()];
-        let operator = study.networks.operator(ELEMENTS, n)?;
-        let run = (Variant::new(flow, ELEMENTS, n), &operator);
-        let (time, to) = ((steps, setting.reference_ratio), references.first());
-        let run = setting.run(&mut session, what, run, time, (to, &exact))?;
+        let planned = Planned {
+            variant: Variant::new(flow, ELEMENTS, n),
+            operator: study.networks.operator(ELEMENTS, n)?,
+        };
+        let to = Yardsticks {
+            reference: references.first(),
+            exact: &exact,
+        };
+        let ratio = setting.reference_ratio;
+        let run = setting.run(&mut session, what, &planned, steps, ratio, to)?;
         references.push(run);
     }
-    let (mut runs, to) = (Vec::new(), (references.first(), &exact[..]));
-    for (variant, operator) in &study.plan {
-        runs.push(setting.run(&mut session, "", (*variant, operator), (steps, 1), to)?);
+    let mut runs = Vec::new();
+    let to = Yardsticks {
+        reference: references.first(),
+        exact: &exact,
+    };
+    for planned in &study.plan {
+        runs.push(setting.run(&mut session, "", planned, steps, 1, to)?);
     }
     let mut second_order = Vec::new();
     if flow == Flow::Willmore {
         // At the end and at halves of that time.
-        let halves = (steps / 8).checked_ilog2().unwrap_or(0);
-        let halves = halves.min(steps.trailing_zeros());
-        let is_half = |mark: usize| (0..=halves).any(|k| mark == steps >> k);
+        let halvings = (steps / 8).checked_ilog2().unwrap_or(0);
+        let halvings = halvings.min(steps.trailing_zeros());
+        let is_half = |mark: usize| (0..=halvings).any(|k| mark == steps >> k);
         let exact: Vec<&Truth> = exact.iter().filter(|exact| is_half(exact.mark)).collect();
-        let (n, ramp) = (CELLS[1], (time(steps), halves));
-        let reached = (setting.sample).second_order(&mut session, n, ramp, &exact)?;
+        let (n, end) = (CELLS[1], time(steps));
+        let halves = Halves { end, halvings };
+        let reached = (setting.sample).second_order(&mut session, n, halves, &exact)?;
         let controlled = format!("second order, controlled steps, n = {n}");
         let labels = [controlled, "second order, extrapolated to ε = 0".to_owned()];
         second_order.extend(labels.into_iter().zip(reached));
@@ -215,19 +233,21 @@ fn compare(setting: &Setting, options: &Options) -> Result<()> {
 }
 
 impl Setting {
-    /// A run that is compared with a reference, unless it is the same one, and with the exact flow.
+    /// A run in so many steps of `2^-14`, each divided into `ratio` of its own, and how far it is from the yardsticks.
     fn run(
         &self,
         session: &mut Session,
         what: &str,
-        (variant, operator): (Variant, &Operator<2>),
-        (steps, ratio): (usize, usize),
-        (reference, exact): (Option<&Compared>, &[Truth]),
+        planned: &Planned,
+        steps: usize,
+        ratio: usize,
+        to: Yardsticks<'_>,
     ) -> Result<Compared> {
+        let Planned { variant, operator } = planned;
         let grid = Grid::<2>::per_unit(variant.n, self.sample.side)?;
         let initial = (self.sample.initial)(grid, EPS)?;
-        let time = (STEP / ratio as f64, steps * ratio);
-        let mut case = planar_flow((self.flow, operator), self.shape, initial, time);
+        let (tau, count) = (STEP / ratio as f64, steps * ratio);
+        let mut case = planar_flow(self.flow, operator, self.shape, initial, tau, count);
         case.measures = Measure::crossings(0.0);
         case.measures.extend([
             Measure::new("perimeter", |u, _| perimeter(u, EPS).map(Some)),
@@ -237,20 +257,20 @@ impl Setting {
         let name = format!("{}-{ratio}", variant.key());
         let trajectory = session.trajectory(&title, case, &name, &samples(ratio))?;
         let (mut errors, mut from_exact) = (BTreeMap::new(), BTreeMap::new());
-        if let Some(reference) = reference
-            && (reference.variant, reference.ratio) != (variant, ratio)
+        if let Some(reference) = to.reference
+            && (reference.variant, reference.ratio) != (*variant, ratio)
         {
             for k in sampled(steps) {
                 let (own, its) = (k * ratio, k * reference.ratio);
                 errors.insert(k, trajectory.distance(own, &reference.trajectory, its)?);
             }
         }
-        for Truth { mark, outline, .. } in exact {
+        for Truth { mark, outline, .. } in to.exact {
             let points = (self.sample.level)(&trajectory.field(mark * ratio)?, EPS)?;
             from_exact.insert(*mark, outline.largest_distance_of(&points));
         }
         Ok(Compared {
-            variant,
+            variant: *variant,
             trajectory,
             ratio,
             errors,
@@ -345,11 +365,11 @@ impl Comparison<'_> {
         session.csv(errors, "errors")?;
         let compared = self.runs.iter().map(|run| (run, "false"));
         let all = compared.chain(self.references.iter().map(|run| (run, "true")));
-        let steps = all.flat_map(|run| steps::of(run, &run.0.trajectory));
+        let steps = all.flat_map(|run| step_table::rows(run, &run.0.trajectory));
         let steps: Vec<_> = steps.collect();
         let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0.variant)
             .data("reference", |step| step.run.1);
-        session.csv(steps::columns(sheet, &steps), "steps")
+        session.csv(step_table::columns(sheet, &steps), "steps")
     }
 
     fn error_figure(&self) -> Figure {
@@ -392,8 +412,9 @@ impl Comparison<'_> {
     /// Rows: methods at their finest resolution, and the reference; columns: times.
     fn shape_figure(&self) -> Result<Figure> {
         let mut rows: Vec<(&Compared, String)> = Vec::new();
-        for shown in study::methods_in_schemes() {
-            let own = |run: &&Compared| run.variant.look() == shown && !run.errors.is_empty();
+        for shown in study::discretizations() {
+            let own =
+                |run: &&Compared| run.variant.discretization == shown && !run.errors.is_empty();
             if let Some(run) = self.runs.iter().filter(own).max_by_key(|run| run.variant.n) {
                 rows.push((run, run.variant.label().replace(", ", "\n")));
             }
@@ -457,7 +478,7 @@ impl Comparison<'_> {
         let per_step = |run: &Compared| run.trajectory.seconds() / run.trajectory.steps() as f64;
         let increases = |run: &Compared| energy_increases(&run.trajectory.records);
         sheet
-            .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+            .measure("hvp_per_step", "HVP/step", Fixed(1), hvp)
             .column("s/step", Fixed(2), per_step)
             .metric("newton_per_step", newton)
             .metric("energy_increases", |run| {

@@ -139,8 +139,10 @@ impl Equilibrium {
     pub fn relax<const D: usize>(
         self,
         session: &mut Session,
-        (shape, initial): (&str, Field<D>),
-        (operator, mut scales): (Operator<D>, Scales),
+        shape: &str,
+        initial: Field<D>,
+        operator: Operator<D>,
+        mut scales: Scales,
         steps: Option<usize>,
     ) -> Result<AtRest<D>> {
         let (initial, eps) = (Stored::from(initial), scales.eps);
@@ -156,8 +158,8 @@ impl Equilibrium {
         };
         // Steps that succeed take about four Newton steps. With the usual limit a step that is too long takes minutes until it is halved.
         scales.newton.newton_iterations = 15;
-        let time = (time_steps, steps.unwrap_or(MOST));
-        let mut case = Case::willmore(shape, initial, operator, scales, time);
+        let most = steps.unwrap_or(MOST);
+        let mut case = Case::willmore(shape, initial, operator, scales, time_steps, most);
         case.held = Held {
             perimeter: ramp(start.perimeter, perimeter),
             volume: ramp(start.volume, volume),
@@ -256,28 +258,31 @@ pub fn sheet<const D: usize>(all: &[AtRest<D>]) -> Sheet<'_, AtRest<D>> {
     let mut sheet = Sheet::of(all)
         .keyed(|one, name| format!("{}.{name}", one.equilibrium.key))
         .text("equilibrium", |one| one.equilibrium.title.as_str())
-        .measure(energy, (head, energies), AtRest::energy)
-        .measure("exact", ("exact energy", energies), AtRest::exact_energy)
+        .measure(energy, head, energies, AtRest::energy)
+        .measure("exact", "exact energy", energies, AtRest::exact_energy)
         .column("error in %", Fixed(2), |one| 100.0 * error(one));
     for (k, name) in sizes.into_iter().enumerate() {
         let (metric, head) = (format!("{name}_drift"), format!("drift of the {name}"));
-        sheet = sheet.measure(&metric, (&head, Scientific(1)), |one| {
+        sheet = sheet.measure(&metric, &head, Scientific(1), |one| {
             one.drift(name, one.equilibrium.sizes::<D>()[k])
         });
     }
-    let [tension, pressure] = [("tension", forces), ("pressure", forces)];
     sheet
-        .measure("tension", tension, |one| one.last(|made| made.tension))
-        .measure("exact_tension", ("exact tension", forces), |one| {
+        .measure("tension", "tension", forces, |one| {
+            one.last(|made| made.tension)
+        })
+        .measure("exact_tension", "exact tension", forces, |one| {
             one.equilibrium.tension
         })
-        .measure("pressure", pressure, |one| one.last(|made| made.pressure))
-        .measure("exact_pressure", ("exact pressure", forces), |one| {
+        .measure("pressure", "pressure", forces, |one| {
+            one.last(|made| made.pressure)
+        })
+        .measure("exact_pressure", "exact pressure", forces, |one| {
             one.equilibrium.pressure
         })
-        .measure("steps", ("steps", Shortest), |one| one.trajectory.steps())
-        .measure("hvp_total", ("HVP", Fixed(0)), |one| {
+        .measure("steps", "steps", Shortest, |one| one.trajectory.steps())
+        .measure("hvp_total", "HVP", Fixed(0), |one| {
             total_hvp(&one.trajectory.records)
         })
-        .measure("seconds", ("s", Fixed(0)), |one| one.trajectory.seconds())
+        .measure("seconds", "s", Fixed(0), |one| one.trajectory.seconds())
 }

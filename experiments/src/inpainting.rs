@@ -48,8 +48,8 @@ pub struct InpaintingOptions {
     pub figure: FigureOptions,
 
     /// Weights of the energy and network: paper, calibrated or accurate
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = Scheme::Accurate)]
-    pub scheme: Scheme,
+    #[arg(long = "scheme", value_name = "NAME", value_enum, default_value_t = Formulation::Accurate)]
+    pub formulation: Formulation,
 }
 
 pub struct Shape<const D: usize> {
@@ -75,8 +75,8 @@ impl<const D: usize> Shape<D> {
         let moves = |node| grid.node(node).iter().all(|x| low < *x && *x < high);
         let title = format!("inpainted {}", self.title);
         let initial = phase_field(grid, &self.initial, scales.eps)?;
-        let time = (self.rule, self.steps);
-        let mut case = Case::willmore(&title, initial, operator.clone(), scales, time);
+        let (operator, rule) = (operator.clone(), self.rule);
+        let mut case = Case::willmore(&title, initial, operator, scales, rule, self.steps);
         case.region = Some((0..grid.len()).map(moves).collect());
         case.steps.first_substep = Some(first_substep(scales.eps));
         case.stops.insert(0, Stop::Motion(STILL));
@@ -89,12 +89,13 @@ fn first_substep(eps: f64) -> f64 {
 }
 
 pub fn parameters<const D: usize>(
-    (n, scales): (usize, &Scales),
+    n: usize,
+    scales: &Scales,
     operator: &Operator<D>,
     shapes: &[Shape<D>],
 ) -> Value {
     json!({
-        "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "scheme": operator.scheme,
+        "n": n, "eps": scales.eps, "mcf_step": scales.mcf_step, "scheme": operator.discretization.formulation,
         "shapes": shapes.iter().map(|shape| shape.key).collect::<Vec<_>>(),
         "tau": shapes.iter().map(|shape| shape.rule).collect::<Vec<_>>(),
         "steps": shapes.iter().map(|shape| shape.steps).collect::<Vec<_>>(),
@@ -170,14 +171,14 @@ pub fn finish<const D: usize>(
     let energies = Figure::new("Willmore energy while inpainting", 2).with_panels(energies);
     session.figure(energies, "energies")?;
     let runs = all.iter().map(|one| (one.shape.key, one.trajectory));
-    steps::write(&session, "shape", runs)?;
+    step_table::write(&session, "shape", runs)?;
     let mut rows = Vec::new();
     for one in all {
         for &(step, distance) in &one.distances {
             rows.push((one, step, distance, one.trajectory.record(step)));
         }
     }
-    let distance = ("L² distance to the whole, or to the start", Fixed(5));
+    let head = "L² distance to the whole, or to the start";
     let shown = Sheet::of(&rows)
         .keyed(|(one, step, ..), name| format!("{}.{name}.step{step}", one.shape.key))
         .text("shape", |(one, ..)| one.shape.title)
@@ -185,7 +186,7 @@ pub fn finish<const D: usize>(
         .column("time in steps", Shortest, |(one, .., record)| {
             record.map_or(0.0, |r| r.time / one.tau())
         })
-        .measure("distance", distance, |(.., distance, _)| *distance)
+        .measure("distance", head, Fixed(5), |(.., distance, _)| *distance)
         .column("Willmore energy", Fixed(3), |(.., record)| {
             record.and_then(Record::willmore_energy)
         });

@@ -32,7 +32,7 @@ pub mod products;
 pub mod programs;
 pub mod session;
 pub mod smoothing;
-pub mod steps;
+pub mod step_table;
 pub mod storages;
 pub mod study;
 pub mod surfaces;

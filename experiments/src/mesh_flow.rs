@@ -1,8 +1,8 @@
-//! A mesh of the paper under Willmore flow by several schemes.
+//! A mesh of the paper under Willmore flow in several formulations.
 
 use crate::meshes::{KnownMesh, MeshOptions};
 use crate::prelude::*;
-use crate::surfaces::{Flowed, SchemeOptions, Setting, Surface, View};
+use crate::surfaces::{Flowed, FormulationOptions, Setting, Surface, View};
 
 /// A program: a mesh, and how it flows there.
 pub struct MeshFlow {
@@ -31,7 +31,7 @@ struct Options {
     mesh: MeshOptions,
 
     #[command(flatten)]
-    schemes: SchemeOptions,
+    formulations: FormulationOptions,
 
     /// Number of time steps [default: that of the paper]
     #[arg(long, value_name = "COUNT")]
@@ -52,8 +52,9 @@ impl MeshFlow {
     fn compute(&self, options: &Options) -> Result<()> {
         let run = &options.figure.run;
         let side = options.mesh.box_side(&self.mesh);
-        let variants = options.schemes.learned();
-        let setting = Setting::new(&options.figure, &variants, [32, self.cells], side)?;
+        let discretizations = options.formulations.learned();
+        let usual = [32, self.cells];
+        let setting = Setting::new(&options.figure, &discretizations, usual, side)?;
         let (time_steps, more) = self.time_steps(setting.n);
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
@@ -77,8 +78,8 @@ impl MeshFlow {
             view: View { up, ..self.view },
         };
         let title = format!("Willmore flow: {}", surface.title);
-        let (surfaces, time) = ([(surface, initial)], (time_steps, steps));
-        setting.run(session, &title, &surfaces, time, self.remarks)
+        let surfaces = [(surface, initial)];
+        setting.run(session, &title, &surfaces, time_steps, steps, self.remarks)
     }
 
     /// The steps on `n` cells per unit length, and how many more than the paper's they are. On finer grids a first step that is

@@ -22,12 +22,12 @@ pub fn scales() -> Scales {
     }
 }
 
-/// The learned operator in the paper's scheme,
-pub const PAPERS: (Method, Scheme) = (Method::Hybrid, Scheme::Paper);
+/// The learned operator in the paper's formulation,
+pub const PAPERS: Discretization = Discretization::new(Method::Hybrid, Formulation::Paper);
 /// and in that of the least errors.
-pub const ACCURATE: (Method, Scheme) = (Method::Hybrid, Scheme::Accurate);
+pub const ACCURATE: Discretization = Discretization::new(Method::Hybrid, Formulation::Accurate);
 /// The finite elements of the paper's references.
-pub const ELEMENTS: (Method, Scheme) = (Method::FeImplicit, Scheme::Paper);
+pub const ELEMENTS: Discretization = Discretization::new(Method::FeImplicit, Formulation::Paper);
 
 /// Options for programs that use trained networks.
 #[derive(Args, Clone, Debug, Default)]
@@ -38,15 +38,15 @@ pub struct NetworkOptions {
 }
 
 impl NetworkOptions {
-    /// Where the networks of the paper's and the calibrated scheme come from; files that meet none of the needs are refused.
+    /// Where the networks of the paper's and the calibrated formulation come from; files that meet none of the needs are refused.
     pub fn load(&self, needs: &[NeededNetwork]) -> Result<Chosen> {
         Ok(Chosen(Networks::load(&self.network, needs)?))
     }
 }
 
 /// Whether a user's network takes part.
-pub fn takes_networks((method, scheme): (Method, Scheme)) -> bool {
-    method.is_learned() && scheme != Scheme::Accurate
+pub fn takes_networks(discretization: Discretization) -> bool {
+    discretization.method.is_learned() && discretization.formulation != Formulation::Accurate
 }
 
 /// The user's networks in place of those of the paper's recipe, before the shipped ones.
@@ -54,33 +54,35 @@ pub fn takes_networks((method, scheme): (Method, Scheme)) -> bool {
 pub struct Chosen(Networks);
 
 impl Chosen {
-    /// Where the network of a scheme comes from; that of the accurate recipe is always the shipped one.
-    pub fn of(&self, scheme: Scheme) -> Networks {
-        match scheme {
-            Scheme::Accurate => Networks::default(),
-            Scheme::Paper | Scheme::Calibrated => self.0.clone(),
+    /// Where the network of a formulation comes from; that of the accurate recipe is always the shipped one.
+    pub fn of(&self, formulation: Formulation) -> Networks {
+        match formulation {
+            Formulation::Accurate => Networks::default(),
+            Formulation::Paper | Formulation::Calibrated => self.0.clone(),
         }
     }
 
-    pub fn find(&self, scheme: Scheme, needed: &NeededNetwork) -> Result<NamedNetwork> {
-        Ok(self.of(scheme).find(scheme.shipped(), needed)?)
+    pub fn find(&self, formulation: Formulation, needed: &NeededNetwork) -> Result<NamedNetwork> {
+        let networks = self.of(formulation);
+        Ok(networks.find(formulation.shipped(), needed)?)
     }
 
     pub fn learned<const D: usize>(
         &self,
-        scheme: Scheme,
+        formulation: Formulation,
         needed: &NeededNetwork,
     ) -> Result<Operator<D>> {
-        Ok(Operator::learned(scheme, self.find(scheme, needed)?)?)
+        let network = self.find(formulation, needed)?;
+        Ok(Operator::learned(formulation, network)?)
     }
 
-    /// The operator of a method in a scheme at resolution `n` of the convergence tests.
-    pub fn operator(&self, (method, scheme): (Method, Scheme), n: usize) -> Result<Operator<2>> {
-        if method.is_learned() {
-            return self.learned(scheme, &convergence_network(n)?);
+    /// The operator of a discretization at resolution `n` of the convergence tests.
+    pub fn operator(&self, discretization: Discretization, n: usize) -> Result<Operator<2>> {
+        if discretization.method.is_learned() {
+            return self.learned(discretization.formulation, &convergence_network(n)?);
         }
         let grid = Grid::<2>::per_unit(n, 1.0)?;
-        let elements = Operator::finite_elements(method, scheme, &grid, &scales());
+        let elements = Operator::finite_elements(discretization, &grid, &scales());
         Ok(elements?)
     }
 }
@@ -98,29 +100,32 @@ pub fn convergence_network(n: usize) -> Result<NeededNetwork> {
 
 /// A flow at the scales of the convergence tests in equal steps, with nothing measured; the inner step of mean curvature flow is its step.
 pub fn planar_flow(
-    (flow, operator): (Flow, &Operator<2>),
+    flow: Flow,
+    operator: &Operator<2>,
     shape: &str,
     initial: Field<2>,
-    (tau, steps): (f64, usize),
+    tau: f64,
+    steps: usize,
 ) -> Case<2> {
     let mut scales = scales();
     if flow == Flow::MeanCurvature {
         scales.mcf_step = tau;
     }
-    let time = (StepRule::Constant(tau), steps);
+    let rule = StepRule::Constant(tau);
     Case {
         flow,
         measures: Vec::new(),
-        ..Case::willmore(shape, initial, operator.clone(), scales, time)
+        ..Case::willmore(shape, initial, operator.clone(), scales, rule, steps)
     }
 }
 
-/// The operator of a method in a scheme with the shipped network for the scales of a grid.
+/// The operator of a discretization with the shipped network for the scales of a grid.
 pub fn operator<const D: usize>(
-    variant: (Method, Scheme),
+    discretization: Discretization,
     grid: &Grid<D>,
     scales: &Scales,
 ) -> Result<Operator<D>> {
     let (needed, networks) = (scales.needs(D, grid.spacing()), Networks::default());
-    Ok(Operator::new(variant, &networks, &needed, grid, scales)?)
+    let operator = Operator::new(discretization, &networks, &needed, grid, scales);
+    Ok(operator?)
 }

@@ -11,5 +11,5 @@ pub use crate::networks::{
 };
 pub use crate::options::{FigureOptions, RunOptions, distinct};
 pub use crate::session::{Session, Stage};
-pub use crate::study::{self, Study, StudyOptions, Variant};
-pub use crate::{harness, steps};
+pub use crate::study::{self, Planned, Study, StudyOptions, Variant};
+pub use crate::{harness, step_table};

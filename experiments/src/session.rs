@@ -14,7 +14,7 @@ pub struct Session {
     pub options: RunOptions,
     pub device: ComputeDevice,
     pub output: OutputDir,
-    pub progress: Progress,
+    pub progress: ProgressBars,
     /// What is run, and the wall times of its parts.
     pub manifest: Manifest,
     pub summary: Summary,
@@ -63,7 +63,7 @@ impl Session {
                 [device.kind().name(), place, &dtype],
                 options.seed,
             )?,
-            progress: Progress::new(options.quiet),
+            progress: ProgressBars::new(options.quiet),
             summary: Summary::default(),
             report: Vec::new(),
             clock: Instant::now(),

@@ -34,13 +34,14 @@ pub fn fairing_flow(title: &str, distance: Field<3>) -> Result<Case<3>> {
     };
     let mut operator = operator(ACCURATE, &grid, &scales)?;
     operator.storage = Storage::Auto;
-    Ok(Case::willmore(title, initial, operator, scales, (rule, 0)))
+    Ok(Case::willmore(title, initial, operator, scales, rule, 0))
 }
 
 /// A picture of a mesh in a frame.
 pub fn mesh_raster(
     mesh: &TriangleMesh,
-    (up, frame): (UpAxis, BoundingBox<3>),
+    up: UpAxis,
+    frame: BoundingBox<3>,
     caption: impl Into<String>,
 ) -> Result<Raster> {
     let scene = (Scene::of_mesh(mesh.clone()).within(frame)).view(View::from_front_left(up));

@@ -109,11 +109,11 @@ impl StorageOptions {
             scales.newton = NewtonParams::second_order();
             let initial = (CROSS.initial)(grid, scales.eps)?;
             let operator = operator(ACCURATE, &grid, &scales)?;
-            let time = (StepRule::Controlled, cross_steps);
-            let case = Case::willmore(CROSS.key, initial, operator, scales, time);
+            let (rule, count) = (StepRule::Controlled, cross_steps);
+            let case = Case::willmore(CROSS.key, initial, operator, scales, rule, count);
             measured.push(Measured::new(CROSS.key, n, Storage::Bricks, case, session)?);
         }
-        let operator = Chosen::default().learned(Scheme::Accurate, &needed_network())?;
+        let operator = Chosen::default().learned(Formulation::Accurate, &needed_network())?;
         for n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
@@ -128,8 +128,8 @@ impl StorageOptions {
                 })?;
                 drop(mesh);
                 let first = FIRST_STEP * grid.spacing().powi(4);
-                let time = (StepRule::Doubling(first), steps);
-                let case = Case::willmore(&title, initial, operator.clone(), scales, time);
+                let (operator, rule) = (operator.clone(), StepRule::Doubling(first));
+                let case = Case::willmore(&title, initial, operator, scales, rule, steps);
                 measured.push(Measured::new("armadillo", n, storage, case, session)?);
             }
         }

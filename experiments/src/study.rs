@@ -1,4 +1,4 @@
-//! Studies in the plane at the scales of the convergence tests: methods in their schemes at several resolutions, and their colours.
+//! Studies in the plane at the scales of the convergence tests: discretizations at several resolutions, and their colours.
 
 use geometry::contour::zero_level;
 
@@ -29,8 +29,8 @@ pub struct StudyOptions {
 
     /// One scheme alone, where it makes a difference: paper, calibrated, or accurate, which is calibrated with the network of
     /// the accurate recipe [default: all]
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub scheme: Option<Scheme>,
+    #[arg(long = "scheme", value_name = "NAME", value_enum)]
+    pub formulation: Option<Formulation>,
 }
 
 impl StudyOptions {
@@ -43,7 +43,7 @@ impl StudyOptions {
         })
     }
 
-    /// The chosen methods in their schemes at all resolutions; without a choice those that are `usual` at a resolution.
+    /// The chosen methods in their formulations at all resolutions; without a choice those that are `usual` at a resolution.
     pub fn variants(&self, flow: Flow, usual: impl Fn(Method, usize) -> bool) -> Vec<Variant> {
         let chosen = |method: Method, n: usize| match &self.methods[..] {
             [] => usual(method, n),
@@ -51,9 +51,10 @@ impl StudyOptions {
         };
         let mut variants = Vec::new();
         for method in Method::ALL {
-            for scheme in method.chosen_schemes(flow, self.scheme) {
+            for formulation in method.chosen_formulations(flow, self.formulation) {
+                let discretization = Discretization::new(method, formulation);
                 let cells = self.cells().into_iter().filter(|&n| chosen(method, n));
-                variants.extend(cells.map(|n| Variant::new(flow, (method, scheme), n)));
+                variants.extend(cells.map(|n| Variant::new(flow, discretization, n)));
             }
         }
         variants
@@ -63,17 +64,16 @@ impl StudyOptions {
 #[derive(Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
     pub flow: Flow,
-    pub method: Method,
-    pub scheme: Scheme,
+    #[serde(flatten)]
+    pub discretization: Discretization,
     pub n: usize,
 }
 
 impl Variant {
-    pub fn new(flow: Flow, (method, scheme): (Method, Scheme), n: usize) -> Self {
+    pub fn new(flow: Flow, discretization: Discretization, n: usize) -> Self {
         Self {
             flow,
-            method,
-            scheme,
+            discretization,
             n,
         }
     }
@@ -82,47 +82,51 @@ impl Variant {
     pub fn columns<R>(sheet: Sheet<'_, R>, of: impl Fn(&R) -> Self) -> Sheet<'_, R> {
         sheet
             .data("n", |row| of(row).n)
-            .data("method", |row| of(row).method.to_string())
-            .data("scheme", |row| of(row).scheme.to_string())
+            .data("method", |row| of(row).discretization.method.to_string())
+            .data("scheme", |row| {
+                of(row).discretization.formulation.to_string()
+            })
     }
 
     /// Name in metrics after the flow or shape, such as `n128.hybrid_calibrated`.
     pub fn key(&self) -> String {
-        format!("n{}.{}", self.n, self.method.key_in(self.scheme))
+        format!("n{}.{}", self.n, self.discretization.key())
     }
 
     pub fn label(&self) -> String {
-        self.method.label_in(self.scheme)
+        self.discretization.label()
     }
+}
 
-    /// What decides its colour in figures.
-    pub fn look(&self) -> (Method, Scheme) {
-        (self.method, self.scheme)
-    }
+/// A variant, and the operator by which it is run.
+pub struct Planned {
+    pub variant: Variant,
+    pub operator: Operator<2>,
 }
 
 /// What is compared with what, with all operators.
 pub struct Study {
     pub cells: BTreeSet<usize>,
-    pub plan: Vec<(Variant, Operator<2>)>,
+    pub plan: Vec<Planned>,
     pub networks: Chosen,
 }
 
 impl Study {
     /// The operators of all variants; variants without a network are left out if the accurate recipe has one for the resolution.
     pub fn new(options: &NetworkOptions, variants: &[Variant]) -> Result<Self> {
-        let learned = variants.iter().filter(|v| takes_networks(v.look()));
+        let learned = variants.iter().filter(|v| takes_networks(v.discretization));
         let needs = learned.map(|v| convergence_network(v.n));
         let networks = options.load(&needs.collect::<Result<Vec<_>, _>>()?)?;
         let mut plan = Vec::new();
-        for variant in variants {
-            let other = || networks.find(Scheme::Accurate, &convergence_network(variant.n)?);
-            let operator = networks.operator(variant.look(), variant.n);
+        for &variant in variants {
+            let other = || networks.find(Formulation::Accurate, &convergence_network(variant.n)?);
+            let operator = networks.operator(variant.discretization, variant.n);
             let error = operator.as_ref().err();
             let error = error.and_then(|error| error.downcast_ref::<model::Error>());
             let is_missing = matches!(error, Some(model::Error::MissingNetwork { .. }));
             if !(is_missing && other().is_ok()) {
-                plan.push((*variant, operator?));
+                let operator = operator?;
+                plan.push(Planned { variant, operator });
             }
         }
         Ok(Self {
@@ -133,12 +137,12 @@ impl Study {
     }
 
     pub fn variants(&self) -> impl Iterator<Item = Variant> {
-        self.plan.iter().map(|(variant, _)| *variant)
+        self.plan.iter().map(|planned| planned.variant)
     }
 
     /// Checksums of the networks of the variants, for the manifest.
     pub fn checksums(&self) -> BTreeMap<String, String> {
-        let of = |(variant, operator): &(Variant, Operator<2>)| {
+        let of = |Planned { variant, operator }: &Planned| {
             Some((variant.key(), operator.network()?.network.fingerprint()))
         };
         self.plan.iter().filter_map(of).collect()
@@ -159,24 +163,25 @@ impl Study {
         [Circle, Square, Triangle, Diamond][self.rank(n).min(3)]
     }
 
-    /// The curve of a variant: colours stand for methods in their schemes, dashes for resolutions. Such curves often coincide, so coarser
+    /// The curve of a variant: colours stand for discretizations, dashes for resolutions. Such curves often coincide, so coarser
     /// ones are wider and show on both sides of finer ones.
     pub fn series(&self, variant: Variant, points: Vec<[f64; 2]>) -> Series {
         Series::new(format!("{}, n = {}", variant.label(), variant.n), points)
-            .with_colour(colour(variant.method, variant.scheme))
+            .with_colour(colour(variant.discretization))
             .with_style(self.dashes(variant.n))
             .with_width(1.8 + 1.4 * self.rank(variant.n) as f64)
     }
 
     /// A chart of such curves with a legend for all variants: methods, then resolutions.
     pub fn chart(&self, chart: LineChart, curves: impl IntoIterator<Item = Series>) -> LineChart {
-        let planned = |look: &_| self.variants().any(|variant| variant.look() == *look);
-        let methods = methods_in_schemes()
-            .filter(planned)
-            .map(|(method, scheme)| {
-                let (label, colour) = (method.label_in(scheme), colour(method, scheme));
-                LegendEntry::line(label, colour, LineStyle::Solid)
-            });
+        let is_planned = |discretization: &Discretization| {
+            let mut variants = self.variants();
+            variants.any(|variant| variant.discretization == *discretization)
+        };
+        let methods = discretizations().filter(is_planned).map(|discretization| {
+            let (label, colour) = (discretization.label(), colour(discretization));
+            LegendEntry::line(label, colour, LineStyle::Solid)
+        });
         let cells = self.cells.iter();
         let resolutions =
             cells.map(|&n| LegendEntry::line(format!("n = {n}"), Colour::Black, self.dashes(n)));
@@ -185,21 +190,22 @@ impl Study {
     }
 }
 
-/// The methods in their schemes, in the order of legends.
-pub fn methods_in_schemes() -> impl Iterator<Item = (Method, Scheme)> {
-    let schemes = |method| Scheme::ALL.map(|scheme| (method, scheme));
-    Method::ALL.into_iter().flat_map(schemes)
+/// All methods in all formulations, in the order of legends.
+pub fn discretizations() -> impl Iterator<Item = Discretization> {
+    let formulations =
+        |method| Formulation::ALL.map(|formulation| Discretization::new(method, formulation));
+    Method::ALL.into_iter().flat_map(formulations)
 }
 
-/// Colour of a method in a scheme, an entry of the palette.
-pub fn colour(method: Method, scheme: Scheme) -> usize {
-    match (method, scheme) {
-        (Method::Hybrid, Scheme::Paper) => 0,
-        (Method::Hybrid, Scheme::Calibrated) => 5,
-        (Method::Hybrid, Scheme::Accurate) => 2,
-        (Method::FeImplicit, Scheme::Paper) => 1,
+/// Colour of a discretization, an entry of the palette.
+pub fn colour(discretization: Discretization) -> usize {
+    match (discretization.method, discretization.formulation) {
+        (Method::Hybrid, Formulation::Paper) => 0,
+        (Method::Hybrid, Formulation::Calibrated) => 5,
+        (Method::Hybrid, Formulation::Accurate) => 2,
+        (Method::FeImplicit, Formulation::Paper) => 1,
         (Method::FeImplicit, _) => 4,
-        (Method::FeSemi, Scheme::Paper) => 3,
+        (Method::FeSemi, Formulation::Paper) => 3,
         (Method::FeSemi, _) => 6,
         (Method::Own, _) => 7,
     }

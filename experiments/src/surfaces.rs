@@ -88,23 +88,23 @@ pub struct Setting {
     pub n: usize,
     pub grid: Grid<3>,
     pub scales: Scales,
-    variants: Vec<(Method, Scheme)>,
+    discretizations: Vec<Discretization>,
     networks: Chosen,
 }
 
 impl Setting {
-    /// For these methods, in a box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
+    /// For these discretizations, in a box of the given side, with the usual numbers of cells per unit length of a quick run and of the paper.
     pub fn new(
         options: &FigureOptions,
-        variants: &[(Method, Scheme)],
+        discretizations: &[Discretization],
         usual: [usize; 2],
         side: f64,
     ) -> Result<Self> {
         let n = options.cells(usual);
-        let learned = variants.iter().filter(|&&variant| takes_networks(variant));
+        let learned = discretizations.iter().filter(|one| takes_networks(**one));
         let needs: Vec<_> = learned.map(|_| needed_network()).collect();
         Ok(Self {
-            variants: variants.to_vec(),
+            discretizations: discretizations.to_vec(),
             networks: options.networks.load(&needs)?,
             grid: centred_box(n, side)?,
             scales: scales(n),
@@ -112,11 +112,11 @@ impl Setting {
         })
     }
 
-    pub fn operator(&self, variant: (Method, Scheme)) -> Result<Operator<3>> {
-        let (networks, needed) = (self.networks.of(variant.1), needed_network());
-        let (grid, scales) = (&self.grid, &self.scales);
-        let mut operator = Operator::new(variant, &networks, &needed, grid, scales)?;
-        if variant == ACCURATE {
+    pub fn operator(&self, discretization: Discretization) -> Result<Operator<3>> {
+        let networks = self.networks.of(discretization.formulation);
+        let (needed, grid, scales) = (needed_network(), &self.grid, &self.scales);
+        let mut operator = Operator::new(discretization, &networks, &needed, grid, scales)?;
+        if discretization == ACCURATE {
             operator.storage = Storage::Auto;
         }
         Ok(operator)
@@ -125,9 +125,9 @@ impl Setting {
     /// The parameters of a program for its manifest: the common ones with the networks of all operators, and others.
     pub fn parameters(&self, mut others: Value) -> Result<Value> {
         let mut networks = BTreeMap::new();
-        for &variant in &self.variants {
-            if let Some(named) = self.operator(variant)?.network() {
-                networks.insert(variant.0.key_in(variant.1), named.network.fingerprint());
+        for &discretization in &self.discretizations {
+            if let Some(named) = self.operator(discretization)?.network() {
+                networks.insert(discretization.key(), named.network.fingerprint());
             }
         }
         others["n"] = self.n.into();
@@ -140,17 +140,19 @@ impl Setting {
 }
 
 #[derive(Args, Clone, Copy, Debug)]
-pub struct SchemeOptions {
+pub struct FormulationOptions {
     /// One scheme alone: paper, calibrated or accurate [default: paper and accurate]
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub scheme: Option<Scheme>,
+    #[arg(long = "scheme", value_name = "NAME", value_enum)]
+    pub formulation: Option<Formulation>,
 }
 
-impl SchemeOptions {
-    /// The learned operator in these schemes.
-    pub fn learned(&self) -> Vec<(Method, Scheme)> {
-        let usual = vec![PAPERS, ACCURATE];
-        (self.scheme).map_or(usual, |scheme| vec![(Method::Hybrid, scheme)])
+impl FormulationOptions {
+    /// The learned operator in these formulations.
+    pub fn learned(&self) -> Vec<Discretization> {
+        match self.formulation {
+            None => vec![PAPERS, ACCURATE],
+            Some(formulation) => vec![Discretization::new(Method::Hybrid, formulation)],
+        }
     }
 }
 
@@ -287,10 +289,10 @@ impl Flowed {
         self.trajectory.case.operator.label()
     }
 
-    /// Prefix of its metrics: the surface, and the method unless it is the learned operator in the paper's scheme.
+    /// Prefix of its metrics: the surface, and the method unless it is the learned operator in the paper's formulation.
     pub fn key(&self) -> String {
         let operator = &self.trajectory.case.operator;
-        if operator.method.is_learned() && operator.scheme == Scheme::Paper {
+        if operator.discretization == PAPERS {
             self.surface.key.to_owned()
         } else {
             format!("{}.{}", self.surface.key, operator.key())
@@ -354,7 +356,7 @@ fn in_words(steps: StepRule) -> String {
 }
 
 impl Setting {
-    /// Lets all surfaces flow by all methods in so many time steps, and ends the program: writes a figure with a row of pictures for each
+    /// Lets all surfaces flow by all discretizations in so many time steps, and ends the program: writes a figure with a row of pictures for each
     /// run, the table of the shown steps, the records of all steps and the metrics. `remarks` looks at the flows, may add to captions, pictures
     /// and metrics, and says what else the note of the figure should say.
     pub fn run(
@@ -362,19 +364,21 @@ impl Setting {
         mut session: Session,
         title: &str,
         surfaces: &[(Surface, Stored<3>)],
-        time: (TimeSteps, usize),
+        steps: TimeSteps,
+        count: usize,
         remarks: impl FnOnce(&mut Session, &mut [Flowed]) -> Result<String>,
     ) -> Result<()> {
         let mut all = Vec::new();
         for (surface, initial) in surfaces {
-            for &variant in &self.variants {
+            for &discretization in &self.discretizations {
                 let mut surface = surface.clone();
-                if variant != PAPERS {
-                    // The paper reports energies of its own scheme.
+                if discretization != PAPERS {
+                    // The paper reports energies of its own formulation.
                     surface.shown.iter_mut().for_each(|(_, w)| *w = None);
                 }
-                let (shape, operator) = (&surface.title, self.operator(variant)?);
-                let case = Case::willmore(shape, initial.clone(), operator, self.scales, time);
+                let (shape, initial) = (&surface.title, initial.clone());
+                let operator = self.operator(discretization)?;
+                let case = Case::willmore(shape, initial, operator, self.scales, steps, count);
                 all.push(surface.flow(case, &mut session)?);
             }
         }
@@ -394,11 +398,11 @@ impl Setting {
             .with_panels(pictures.into_iter().flatten())
             .with_note(format!(
                 "n = {}, ε = 2/n, inner step 1/n², {}. w: Willmore energy {}; a sphere has 8π = 25.13.{remarks}",
-                self.n, in_words(time.0.rule), measured(&self.grid)
+                self.n, in_words(steps.rule), measured(&self.grid)
             ));
         session.figure(figure, "surfaces")?;
         let runs = all.iter().map(|one| (one.surface.key, &one.trajectory));
-        steps::write(&session, "surface", runs)?;
+        step_table::write(&session, "surface", runs)?;
         for one in &all {
             let records = &one.trajectory.records;
             let metrics = [

@@ -41,8 +41,8 @@ pub fn plane(operator: &Operator<2>, n: usize, steps: usize, quick: bool) -> Res
         let grid = Grid::per_unit(n, truth::CROSS.side)?;
         ("cross", (truth::CROSS.initial)(grid, EPS)?)
     };
-    let flow = (Flow::Willmore, operator);
-    Ok(planar_flow(flow, shape, initial, (STEP, steps)))
+    let flow = Flow::Willmore;
+    Ok(planar_flow(flow, operator, shape, initial, STEP, steps))
 }
 
 /// Wall times of the minimizations in seconds.

@@ -98,12 +98,28 @@ const ROUND: f64 = 0.65;
 /// Nodes of a grid beyond which only what is near the surface is stored, where that is less.
 const MOST_STORED: usize = 1 << 22;
 
-/// Controlled steps that end at the times `end / 2^k` for `k` up to `halvings`, among others.
-pub fn controlled(control: ErrorControl, (end, halvings): (f64, u32)) -> TimeSteps {
+/// The times `end / 2^k` for `k` up to `halvings`.
+#[derive(Clone, Copy)]
+pub struct Halves {
+    pub end: f64,
+    pub halvings: u32,
+}
+
+/// Controlled steps that end at these times, among others.
+pub fn controlled(control: ErrorControl, halves: Halves) -> TimeSteps {
+    let Halves { end, halvings } = halves;
     TimeSteps {
         order: Order::Controlled(control),
         ..StepRule::Ramp { tau: end, halvings }.into()
     }
+}
+
+/// A run: its name, its time steps, and the time up to which it goes.
+#[derive(Clone, Copy)]
+pub struct Course<'a> {
+    pub name: &'a str,
+    pub steps: TimeSteps,
+    pub end: f64,
 }
 
 impl<const D: usize> Sample<D> {
@@ -118,46 +134,59 @@ impl<const D: usize> Sample<D> {
         let marks = marks.iter().map(|(mark, _)| *mark);
         Ok(if D == 2 {
             let curves = planar::evolve(&shape, flow, &times, &planar::ACCURACY)?;
-            marks.zip(curves).map(Truth::of_curve).collect()
+            let truth = |(mark, curve)| Truth::of_curve(mark, curve);
+            marks.zip(curves).map(truth).collect()
         } else {
             let surfaces = revolution::evolve(&shape, flow, &times, &revolution::ACCURACY)?;
-            marks.zip(surfaces).map(Truth::of_surface).collect()
+            let truth = |(mark, surface)| Truth::of_surface(mark, &surface);
+            marks.zip(surfaces).map(truth).collect()
         })
     }
 
-    /// Willmore flow on `n` cells per unit length, so many to `eps`, up to a time in such steps.
+    /// Willmore flow on `n` cells per unit length, so many to `eps`.
     pub fn run(
         &self,
         session: &mut Session,
-        (n, eps_over_h): (usize, f64),
-        variant: (Method, Scheme),
-        (name, steps, end): (&str, TimeSteps, f64),
+        n: usize,
+        eps_over_h: f64,
+        discretization: Discretization,
+        course: Course<'_>,
     ) -> Result<Trajectory<D>> {
         let grid = Grid::<D>::per_unit(n, self.side)?;
         let initial = (self.initial)(grid, eps_over_h * grid.spacing())?;
-        let name = format!("{}-n{n}-{name}", self.key);
-        let start = (self.key, initial, eps_over_h);
-        flow(session, start, variant, (&name, steps, end))
+        let name = &format!("{}-n{n}-{}", self.key, course.name);
+        let course = Course { name, ..course };
+        flow(
+            session,
+            self.key,
+            initial,
+            eps_over_h,
+            discretization,
+            course,
+        )
     }
 
-    /// What controlled steps of second order with two cells to `eps` reach at the times of the exact flow, `end / 2^k` for some `k` up to
-    /// `halvings` or the last one, and [the same extrapolated](Self::extrapolated); adds the metrics `KEY.nN.controlled` and
+    /// What controlled steps of second order with two cells to `eps` reach at the times of the exact flow, some of the halves or
+    /// the last one, and [the same extrapolated](Self::extrapolated); adds the metrics `KEY.nN.controlled` and
     /// `KEY.extrapolated`.
     pub fn second_order(
         &self,
         session: &mut Session,
         n: usize,
-        ramp: (f64, u32),
+        halves: Halves,
         exact: &[&Truth],
     ) -> Result<[Vec<Reached>; 2]> {
-        let steps = controlled(ErrorControl::default(), ramp);
-        let run = ("controlled", steps, last(exact));
-        let run = self.run(session, (n, 2.0), ACCURATE, run)?;
+        let course = Course {
+            name: "controlled",
+            steps: controlled(ErrorControl::default(), halves),
+            end: last(exact),
+        };
+        let run = self.run(session, n, 2.0, ACCURATE, course)?;
         let reached = exact.iter().map(|exact| Reached::of(self, &run, exact));
         let reached = reached.collect::<Result<Vec<_>, _>>()?;
         let key = format!("{}.n{n}.controlled", self.key);
         (reached.iter()).try_for_each(|reached| reached.record(session, &key))?;
-        Ok([reached, self.extrapolated(session, ramp, exact)?])
+        Ok([reached, self.extrapolated(session, halves, exact)?])
     }
 
     /// The flow at such times extrapolated to `eps = 0` from strictly controlled runs on two grids, the finer one with half the `eps`: the coarsest
@@ -165,7 +194,7 @@ impl<const D: usize> Sample<D> {
     pub fn extrapolated(
         &self,
         session: &mut Session,
-        ramp: (f64, u32),
+        halves: Halves,
         exact: &[&Truth],
     ) -> Result<Vec<Reached>> {
         // With two cells to eps the lattice holds slow flows back by as much as the extrapolation leaves. In space no network has more.
@@ -185,8 +214,12 @@ impl<const D: usize> Sample<D> {
         for (k, &n) in cells.iter().enumerate() {
             let in_its_pair = |truth: &&&Truth| k == coarser(truth) || k == coarser(truth) + 1;
             let used: Vec<&Truth> = exact.iter().filter(in_its_pair).copied().collect();
-            let steps = ("controlled_strict", controlled(STRICT, ramp), last(&used));
-            let run = || self.run(session, (n, eps_over_h), ACCURATE, steps);
+            let course = Course {
+                name: "controlled_strict",
+                steps: controlled(STRICT, halves),
+                end: last(&used),
+            };
+            let run = || self.run(session, n, eps_over_h, ACCURATE, course);
             runs.push((!used.is_empty()).then(run).transpose()?);
         }
         let (key, mut all) = (format!("{}.extrapolated", self.key), Vec::new());
@@ -208,13 +241,16 @@ fn last(exact: &[&Truth]) -> f64 {
     exact.iter().map(|truth| truth.time()).fold(0.0, f64::max)
 }
 
-/// Willmore flow of a phase field with so many cells to `eps`, a shape of this name, up to a time in such steps.
+/// Willmore flow of a phase field with so many cells to `eps`, a shape of this name.
 pub fn flow<const D: usize>(
     session: &mut Session,
-    (shape, initial, eps_over_h): (&str, Field<D>, f64),
-    variant: (Method, Scheme),
-    (name, steps, end): (&str, TimeSteps, f64),
+    shape: &str,
+    initial: Field<D>,
+    eps_over_h: f64,
+    discretization: Discretization,
+    course: Course<'_>,
 ) -> Result<Trajectory<D>> {
+    let Course { name, steps, end } = course;
     let newton = match steps.order {
         Order::First => NewtonParams::default(),
         Order::Controlled(STRICT) => NewtonParams {
@@ -229,11 +265,11 @@ pub fn flow<const D: usize>(
         newton,
         ..Scales::of_grid(grid.spacing(), eps_over_h)
     };
-    let mut operator = operator(variant, &grid, &scales)?;
+    let mut operator = operator(discretization, &grid, &scales)?;
     if grid.len() > MOST_STORED {
         operator.storage = Storage::Auto;
     }
-    let mut case = Case::willmore(shape, initial, operator, scales, (steps, 1));
+    let mut case = Case::willmore(shape, initial, operator, scales, steps, 1);
     case.stops = vec![Stop::Time(end)];
     case.measures = Measure::crossings(0.0);
     session.trajectory(name, case, name, &Samples::every(1))
@@ -250,7 +286,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    fn of_curve((mark, outline): (usize, Curve)) -> Self {
+    fn of_curve(mark: usize, outline: Curve) -> Self {
         let along = |direction| outline.distance_along(direction).unwrap_or(f64::NAN);
         let sizes = Numbers::from([
             ("tip", along([1.0, 0.0])),
@@ -266,7 +302,7 @@ impl Truth {
         }
     }
 
-    fn of_surface((mark, surface): (usize, Surface)) -> Self {
+    fn of_surface(mark: usize, surface: &Surface) -> Self {
         let [area, volume, w] = [surface.area(), surface.volume(), surface.energy()];
         Self {
             mark,

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::common::{Summary, finished, read_summary, refused, run};
-use engine::{Method, Record, Run, Scheme};
+use engine::{Record, Run};
 use experiments::experiment::Experiment;
-use experiments::networks::Chosen;
+use experiments::networks::{Chosen, PAPERS};
 use experiments::programs::EXPERIMENTS;
 use experiments::timing;
 use model::Shipped;
@@ -555,9 +555,7 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     let summary = quick_summary(PERFORMANCE, root.path());
     let metric = |name: &str| summary[name];
     // The work is that of the same flow by the library.
-    let operator = Chosen::default()
-        .operator((Method::Hybrid, Scheme::Paper), 128)
-        .unwrap();
+    let operator = Chosen::default().operator(PAPERS, 128).unwrap();
     let case = timing::plane(&operator, 128, 2, true).unwrap();
     let mut flow = Run::new(case, &ComputeDevice::default_compiled().unwrap()).unwrap();
     while flow.step().unwrap().is_some() {}

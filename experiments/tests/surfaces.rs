@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::common::{finished, read_summary, refused, run};
-use engine::{Case, Record, Run, Scheme, StepRule, energy_increases};
+use engine::{Case, Formulation, Record, Run, StepRule, energy_increases};
 use experiments::networks::Chosen;
 use experiments::surfaces::{centred_box, needed_network, scales};
 use geometry::measure::{l2_distance, zero_set_volume};
@@ -243,9 +243,10 @@ fn a_volume_flows_like_the_shape_it_was_made_from() {
 
 fn flow(initial: &Field<3>, n: usize, steps: usize) -> (Field<3>, Vec<Record>) {
     let device = ComputeDevice::default_compiled().unwrap();
-    let operator = Chosen::default().learned(Scheme::Paper, &needed_network());
-    let time = (StepRule::Constant(TAU), steps);
-    let case = Case::willmore("shape", initial.clone(), operator.unwrap(), scales(n), time);
+    let operator = Chosen::default().learned(Formulation::Paper, &needed_network());
+    let (initial, operator) = (initial.clone(), operator.unwrap());
+    let rule = StepRule::Constant(TAU);
+    let case = Case::willmore("shape", initial, operator, scales(n), rule, steps);
     let mut run = Run::new(case, &device).unwrap();
     run.advance(None, &mut [], &Interrupt::never()).unwrap();
     (run.field().clone(), run.records().to_vec())

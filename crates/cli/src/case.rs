@@ -1,13 +1,13 @@
 //! From options to cases: which device and operator, which time steps, which sizes are held, and when it ends.
 
-use engine::{ErrorControl, Flow, Held, Helfrich, Operator, Own, Storage, Target, TimeSteps};
+use engine::{
+    Discretization, ErrorControl, Flow, Held, Helfrich, Operator, Own, Storage, Target, TimeSteps,
+};
 use model::{Network, Networks};
 use solver::NewtonParams;
 
-use crate::cli::{
-    CommonOptions, FlowOptions, MessageOptions, RunCommand, RunOptions, SchemeOptions,
-};
-use crate::input::{Start, usual_box};
+use crate::cli::{CommonOptions, FlowOptions, MessageOptions, OperatorOptions, RunCommand};
+use crate::input::{InitialShape, usual_box};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -41,7 +41,7 @@ impl CommonOptions {
     }
 }
 
-impl SchemeOptions {
+impl OperatorOptions {
     /// Interface width in cells.
     pub fn eps_over_h(&self) -> f64 {
         self.eps_over_h.unwrap_or(2.0)
@@ -60,7 +60,7 @@ impl SchemeOptions {
     }
 
     /// The step of mean curvature flow on a grid.
-    pub fn operator<const D: usize>(
+    pub fn on_grid<const D: usize>(
         &self,
         method: Method,
         grid: &Grid<D>,
@@ -68,12 +68,13 @@ impl SchemeOptions {
         let scales = Scales::of_grid(grid.spacing(), self.eps_over_h());
         let needed = scales.needs(D, grid.spacing());
         let networks = Networks::load(self.network.as_slice(), &[needed])?;
-        let scheme = if method.is_learned() {
-            self.scheme
+        let formulation = if method.is_learned() {
+            self.formulation
         } else {
-            Scheme::Paper
+            Formulation::Paper
         };
-        let mut operator = Operator::new((method, scheme), &networks, &needed, grid, &scales)?;
+        let discretization = Discretization::new(method, formulation);
+        let mut operator = Operator::new(discretization, &networks, &needed, grid, &scales)?;
         operator.storage = self.storage.unwrap_or(Storage::Auto);
         Ok((scales, operator))
     }
@@ -127,19 +128,19 @@ impl RunCommand {
     /// The flow from a start, and how that is shown; the rule for the time steps is filled in.
     pub fn case<const D: usize, O: Presentation<D>>(
         &mut self,
-        start: Start<D, O>,
+        start: InitialShape<D, O>,
     ) -> Result<(Case<D>, O)> {
         let (flow, method) = match self {
             Self::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
             _ => (Flow::Willmore, Method::Hybrid),
         };
         let grid = *start.initial.grid();
-        let RunOptions { scheme, input, .. } = self.options();
-        let (mut scales, operator) = scheme.operator(method, &grid)?;
+        let options = self.options();
+        let (mut scales, operator) = options.operator.on_grid(method, &grid)?;
         // Time steps that follow from the inner step, a length squared, do so in a box of this side, which gives them their unit.
         let in_box = |side: f64| scales.mcf_step * (grid.side() / side).powi(2);
         let (_, usual_side) = usual_box::<D>();
-        let inner = in_box(input.box_side.unwrap_or(usual_side));
+        let inner = in_box(options.input.box_side.unwrap_or(usual_side));
         let usual_inner = in_box(usual_side);
         let usual = self.usual_rule(inner, grid.spacing());
         let rule = match self.willmore() {
@@ -243,15 +244,14 @@ pub fn with_round_edges<const D: usize>(
         return Ok(());
     }
     let holds_volume = options.volume.is_some() || options.reduced_volume.is_some();
-    let (scales, operator) = options.run.scheme.operator(Method::Hybrid, start.grid())?;
+    let (scales, operator) = options.run.operator.on_grid(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
     if sharp.sizes_hold() {
         return Ok(());
     }
     let targets = options.held(start, eps, None)?.targets();
-    let scheme = (scales, operator);
-    match engine::round_edges(start, &sharp, holds_volume, scheme, device)? {
+    match engine::round_edges(start, &sharp, holds_volume, scales, operator, device)? {
         Some((rounded, round)) => {
             let of_surface = if D == 2 { "length" } else { "area" };
             let area = targets.perimeter.unwrap_or(sharp.perimeter);

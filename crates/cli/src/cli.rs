@@ -6,7 +6,7 @@ use std::io::Write;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use engine::Storage;
-use report::Progress;
+use report::ProgressBars;
 
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -193,14 +193,20 @@ pub enum Holds {
 /// Which operator, at which scales.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
-pub struct SchemeOptions {
+pub struct OperatorOptions {
     /// Interface width in cells [default: 2, or that of --network]
     #[arg(long, value_name = "RATIO")]
     pub eps_over_h: Option<f64>,
 
     /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
-    #[arg(long, value_name = "NAME", value_enum, default_value = "accurate")]
-    pub scheme: Scheme,
+    #[arg(
+        long = "scheme",
+        value_name = "NAME",
+        value_enum,
+        default_value = "accurate"
+    )]
+    #[serde(rename = "scheme")]
+    pub formulation: Formulation,
 
     /// Use this network, as `willmore train` makes them
     #[arg(long, value_name = "FILE")]
@@ -262,7 +268,7 @@ pub struct RunOptions {
     pub input: InputOptions,
     #[command(flatten)]
     #[serde(flatten)]
-    pub scheme: SchemeOptions,
+    pub operator: OperatorOptions,
 
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT", value_parser = count)]
@@ -493,7 +499,7 @@ pub struct CheckOptions {
     #[command(flatten)]
     pub input: InputOptions,
     #[command(flatten)]
-    pub scheme: SchemeOptions,
+    pub operator: OperatorOptions,
     #[command(flatten)]
     pub common: CommonOptions,
 }
@@ -585,8 +591,8 @@ impl MessageOptions {
         }
     }
 
-    pub fn progress(self) -> Progress {
-        Progress::new(self.quiet || self.json || self.to_pipe)
+    pub fn progress(self) -> ProgressBars {
+        ProgressBars::new(self.quiet || self.json || self.to_pipe)
     }
 }
 

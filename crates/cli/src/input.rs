@@ -17,7 +17,7 @@ use crate::space::{Space, Voxels};
 use crate::volume;
 
 /// What a run starts from.
-pub struct Start<const D: usize, O> {
+pub struct InitialShape<const D: usize, O> {
     pub name: String,
     pub initial: Stored<D>,
     pub presentation: O,
@@ -27,8 +27,8 @@ pub struct Start<const D: usize, O> {
 
 /// What a run starts from, in the dimension of the input.
 pub enum Loaded {
-    Plane(Start<2, Plane>),
-    Space(Start<3, Space>),
+    Plane(InitialShape<2, Plane>),
+    Space(InitialShape<3, Space>),
 }
 
 /// What an input is; the paths of files are absolute.
@@ -272,8 +272,9 @@ impl<'a> Reader<'a> {
             );
         }
         if let Some((device, flow)) = self.whole {
-            let needed = (grid.len(), Storage::bytes(flow, grid.len(), grid.len()));
-            Storage::check(device, &grid, needed, flow == Flow::Willmore)?;
+            let nodes = grid.len();
+            let needed = Storage::bytes(flow, nodes, nodes);
+            Storage::check(device, &grid, nodes, needed, flow == Flow::Willmore)?;
         }
         Ok(grid)
     }
@@ -456,7 +457,7 @@ impl<'a> Reader<'a> {
             own: Some(own),
             ..Space::default()
         };
-        Ok(Loaded::Space(Start {
+        Ok(Loaded::Space(InitialShape {
             name: self.source.name(),
             initial: field,
             presentation,
@@ -495,12 +496,12 @@ impl<'a> Reader<'a> {
         &self,
         initial: impl Into<Stored<D>>,
         presentation: O,
-    ) -> Result<Start<D, O>> {
+    ) -> Result<InitialShape<D, O>> {
         let initial: Stored<D> = initial.into();
         check_phases(&initial, self.options.input.as_deref().unwrap_or_default())?;
         let label = self.options.label;
         let label = label.map_or(String::new(), |label| format!("-label{label}"));
-        Ok(Start {
+        Ok(InitialShape {
             name: self.source.name() + &label,
             initial,
             presentation,
@@ -511,7 +512,7 @@ impl<'a> Reader<'a> {
     fn shape<const D: usize, O: Presentation<D>>(
         &mut self,
         shape: &dyn SignedDistance<D>,
-    ) -> Result<Start<D, O>> {
+    ) -> Result<InitialShape<D, O>> {
         let grid = self.grid()?;
         let field = stored_phase_field(grid, shape, self.eps(&grid))?;
         self.start(field, O::of_box(&grid)?)
@@ -620,7 +621,10 @@ impl<'a> Reader<'a> {
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 
-    fn values<const D: usize, O: Presentation<D>>(&mut self, path: &Path) -> Result<Start<D, O>> {
+    fn values<const D: usize, O: Presentation<D>>(
+        &mut self,
+        path: &Path,
+    ) -> Result<InitialShape<D, O>> {
         let is_phase = *self.options.holds.get_or_insert(Holds::PhaseField) == Holds::PhaseField;
         let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
         let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;

@@ -11,13 +11,14 @@ pub fn mask(text: &str) -> Option<&Path> {
     MESHES.contains(&&*extension(path)).then_some(path)
 }
 
-/// The distance of what stays, from what was typed, with the bytes of the mask, for a mesh and its file. What is on the boundary stays too.
-/// For a colour it tells which vertices are nearer, so that nodes far from all of them stay or move as the nearest one does.
+/// The distance of what stays, from what was typed, with the bytes of the mask, for a mesh, the bytes of its file and the name of that. What is
+/// on the boundary stays too. For a colour it tells which vertices are nearer, so that nodes far from all of them stay or move as the nearest one does.
 pub fn parse(
     text: &str,
     mask: Option<&[u8]>,
     mesh: &TriangleMesh,
-    (bytes, file): (&[u8], &str),
+    bytes: &[u8],
+    file: &str,
 ) -> Result<Box<dyn SignedDistance<3>>> {
     let wrong = |reason: String| Error::options(format!("--keep {text}: {reason}"));
     if let Some(colour) = text.strip_prefix("colour:") {

@@ -88,7 +88,7 @@ impl OwnMesh {
             self.noise = closed.mesh().noise();
         }
         let keep = self.keep.as_deref();
-        let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, (&bytes, &self.file)));
+        let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, &bytes, &self.file));
         let keep = keep.transpose()?;
         let stays = |x| matches!(&keep, Some(keep) if keep.signed_distance(x) <= 0.0);
         let fairing = Fairing::new(closed, self.noise, stays);

@@ -5,8 +5,8 @@
 
 use engine::METRICS;
 use pages::{
-    Facts, Image, Markup, Page, Section, Table, View, figure, five_digits, frames, markdown,
-    thinned, viewer,
+    Facts, ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames,
+    markdown, thinned, viewer,
 };
 use report::{Axis, LineChart, Marker, Series};
 
@@ -73,7 +73,7 @@ impl Files<'_> {
         };
         let mut section = Section::new("Shape").with(shape);
         if let Some(bytes) = self.read(presentation::DISPLACEMENT)? {
-            let image = Image::from_bytes(presentation::DISPLACEMENT, &bytes)?;
+            let image = ImageElement::from_bytes(presentation::DISPLACEMENT, &bytes)?;
             let caption =
                 "How far the surface has gone at its vertices, as colours and as a histogram.";
             section.push(figure(&image, caption));
@@ -87,7 +87,7 @@ impl Files<'_> {
         let stages = self.stages(&[if is_repaired { "png" } else { "svg" }]);
         let mut drawings = Vec::new();
         for (label, name) in thinned(&stages, MOST_FRAMES) {
-            let image = Image::from_bytes(name, &self.run.read(name)?)?;
+            let image = ImageElement::from_bytes(name, &self.run.read(name)?)?;
             drawings.push((label.clone(), image));
         }
         Ok((!drawings.is_empty()).then(|| frames("The shape over the steps", &drawings)))
@@ -109,7 +109,7 @@ impl Files<'_> {
         let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
         Ok(Some(viewer(
             "The surface over the steps",
-            &Image::from_bytes(presentation::PICTURE, &poster)?,
+            &ImageElement::from_bytes(presentation::PICTURE, &poster)?,
             View::from_front_left(up.unwrap_or_default()),
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
@@ -162,8 +162,8 @@ impl Files<'_> {
                 LineChart::new(title, Axis::linear("step"), Axis::linear("")).with_curves([series]),
             );
         }
-        let image = Image::from_bytes("the plot of the steps", plot.to_svg()?.as_bytes())?;
-        let table = Table::from_csv("Steps", &self.run.read_text(METRICS)?)?;
+        let image = ImageElement::from_bytes("the plot of the steps", plot.to_svg()?.as_bytes())?;
+        let table = TableElement::from_csv("Steps", &self.run.read_text(METRICS)?)?;
         let rows = || thinned(table.rows(), MOST_ROWS);
         let (shown, all) = (rows().count(), table.rows().len());
         let note = format!(
@@ -174,7 +174,7 @@ impl Files<'_> {
         let rows = rows().map(|row| row.iter().map(shortened));
         let table = Section::new("Steps as a table")
             .with(markdown(&note))
-            .with(Table::new("Steps", head, rows)?);
+            .with(TableElement::new("Steps", head, rows)?);
         let caption = "Energy and measures of the shape at the beginning and after every step.";
         Ok(Section::new("Steps")
             .with(figure(&image, caption))

@@ -3,7 +3,7 @@
 pub use std::path::{Path, PathBuf};
 pub use std::str::FromStr;
 
-pub use engine::{Case, Measure, Method, Record, Run, Scales, Scheme, StepRule, Stop};
+pub use engine::{Case, Formulation, Measure, Method, Record, Run, Scales, StepRule, Stop};
 pub use geometry::measure::{BoundingBox, has_interface};
 pub use geometry::{
     Field, Grid, NodeSet, PhaseField, Placement, SignedDistance, Stored, UpAxis, ZeroSet, npy,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::time::Instant;
 
 use engine::{Checkpoints, Event, Observer, Store, estimated_time_error};
-use files::Storage as _;
+use files::FileSystem as _;
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 

@@ -1,6 +1,6 @@
 //! Willmore flow of an ellipse, which becomes a circle and grows.
 
-use engine::{Case, ErrorControl, Measure, Operator, Run, Scales, Scheme, Stop, TimeSteps};
+use engine::{Case, ErrorControl, Formulation, Measure, Operator, Run, Scales, Stop, TimeSteps};
 use geometry::{Grid, ZeroSet, phase_field, shapes::Ellipse};
 use model::Networks;
 use operators::ComputeDevice;
@@ -9,14 +9,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::<2>::per_unit(64, 1.25)?;
     let scales = Scales::of_grid(grid.spacing(), 2.0);
     let needed = scales.needs(2, grid.spacing());
-    let network = Networks::default().find(Scheme::Accurate.shipped(), &needed)?;
+    let network = Networks::default().find(Formulation::Accurate.shipped(), &needed)?;
     let initial = phase_field(grid, &Ellipse::new([0.3, 0.2])?, scales.eps)?;
-    let operator = Operator::learned(Scheme::Accurate, network)?;
+    let operator = Operator::learned(Formulation::Accurate, network)?;
     let steps = TimeSteps::controlled(ErrorControl::default());
     let case = Case {
         stops: vec![Stop::Time(0.002)],
         measures: Measure::crossings(0.0),
-        ..Case::willmore("ellipse", initial, operator, scales, (steps, 0))
+        ..Case::willmore("ellipse", initial, operator, scales, steps, 0)
     };
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
     println!("       t        tau    length      area    energy");

@@ -1,6 +1,6 @@
 //! Takes the noise off a closed mesh by Willmore flow: fair_mesh IN OUT, or the built-in lever with noise.
 
-use engine::{Case, Method, Operator, Run, Scales, Scheme, StepRule, Stop};
+use engine::{Case, Discretization, Formulation, Method, Operator, Run, Scales, StepRule, Stop};
 use geometry::{Grid, Placement, SignedDistance, optimal_profile};
 use model::Networks;
 use operators::ComputeDevice;
@@ -30,13 +30,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let followed = fairing.follow(placement, &initial, scales.eps)?;
     let networks = Networks::default();
     let needed = scales.needs(3, grid.spacing());
-    let accurate = (Method::Hybrid, Scheme::Accurate);
+    let accurate = Discretization::new(Method::Hybrid, Formulation::Accurate);
     let operator = Operator::new(accurate, &networks, &needed, &grid, &scales)?;
     let steps = StepRule::Doubling(Fairing::first_step(grid.spacing()));
     let case = Case {
         stops: vec![Stop::Time(fairing.time(grid.spacing(), placement.scale()))],
         measures: Vec::new(),
-        ..Case::willmore("mesh", initial, operator, scales, (steps, 0))
+        ..Case::willmore("mesh", initial, operator, scales, steps, 0)
     };
     let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
     // As far as the noise is.

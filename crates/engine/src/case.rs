@@ -51,7 +51,8 @@ impl<const D: usize> Case<D> {
         initial: impl Into<Stored<D>>,
         operator: Operator<D>,
         scales: Scales,
-        (steps, count): (impl Into<TimeSteps>, usize),
+        steps: impl Into<TimeSteps>,
+        count: usize,
     ) -> Self {
         Self {
             shape: shape.to_owned(),
@@ -112,7 +113,7 @@ impl<const D: usize> Case<D> {
     /// About how many bytes the flow takes if so many cells are stored.
     pub fn bytes(&self, stored: usize) -> f64 {
         let nodes = self.grid().len();
-        let of_elements = match (self.flow, self.operator.method) {
+        let of_elements = match (self.flow, self.operator.discretization.method) {
             (Flow::MeanCurvature, Method::FeImplicit) => PER_NODE_OF_ELEMENTS,
             _ => 0.0,
         };

@@ -21,18 +21,19 @@ pub fn round_edges<const D: usize>(
     start: &Stored<D>,
     sharp: &ZeroSet,
     holds_volume: bool,
-    (scales, operator): (Scales, Operator<D>),
+    scales: Scales,
+    operator: Operator<D>,
     device: &ComputeDevice,
 ) -> Result<Option<(Stored<D>, ZeroSet)>, Error> {
     let eps = scales.eps;
-    let steps = (StepRule::Constant(eps.powi(4)), ROUNDING);
+    let steps = StepRule::Constant(eps.powi(4));
     let case = Case {
         held: Held {
             perimeter: None,
             volume: holds_volume.then(|| Target::keep(sharp.volume)),
         },
         measures: Vec::new(),
-        ..Case::willmore("edges", start.clone(), operator, scales, steps)
+        ..Case::willmore("edges", start.clone(), operator, scales, steps, ROUNDING)
     };
     let mut run = Run::new(case, device)?;
     while run.step()?.is_some() {

@@ -1,7 +1,7 @@
 //! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
 //!
 //! ```
-//! use engine::{Case, Operator, Run, Scales, Scheme, StepRule};
+//! use engine::{Case, Formulation, Operator, Run, Scales, StepRule};
 //! use geometry::{Grid, phase_field, shapes::Cuboid};
 //! use model::Networks;
 //! use operators::ComputeDevice;
@@ -11,11 +11,11 @@
 //! // A square becomes round: the bending energy falls towards that of a circle, pi / R.
 //! let grid = Grid::<2>::per_unit(64, 1.0)?;
 //! let scales = Scales::of_grid(grid.spacing(), 2.0);
-//! let network = Networks::default().find(Scheme::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
+//! let network = Networks::default().find(Formulation::Accurate.shipped(), &scales.needs(2, grid.spacing()))?;
 //! let square = phase_field(grid, &Cuboid::new([0.25; 2])?, scales.eps)?;
-//! let operator = Operator::learned(Scheme::Accurate, network)?;
-//! let steps = (StepRule::ByEnergy(None), 4);
-//! let case = Case::willmore("square of side 1/2", square, operator, scales, steps);
+//! let operator = Operator::learned(Formulation::Accurate, network)?;
+//! let steps = StepRule::ByEnergy(None);
+//! let case = Case::willmore("square of side 1/2", square, operator, scales, steps, 4);
 //! let mut run = Run::new(case, &ComputeDevice::default_compiled()?)?;
 //! run.advance(None, &mut [], &Interrupt::never())?;
 //! for record in run.records() {
@@ -43,13 +43,12 @@
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
-mod advance;
 mod case;
-mod control;
 mod controller;
 mod current;
 mod edges;
 mod error;
+mod error_control;
 mod flow;
 mod measure;
 mod observer;
@@ -59,23 +58,24 @@ mod parts;
 mod record;
 mod run;
 mod step_control;
-mod steps;
 mod stop;
 mod storage;
 mod store;
 mod substeps;
+mod time_steps;
 mod trajectory;
+mod until_stop;
 
 pub use case::Case;
-pub use control::ErrorControl;
 pub use controller::{Attempts, Controller, EqualSteps, Verdict};
 pub use current::Current;
 pub use edges::round_edges;
 pub use error::Error;
+pub use error_control::ErrorControl;
 pub use flow::Flow;
 pub use measure::{DISPLACEMENT, Measure};
 pub use observer::{Event, Observer, Samples};
-pub use operator::{Method, Operator, Scales, Scheme, quarter_square};
+pub use operator::{Discretization, Formulation, Method, Operator, Scales, quarter_square};
 pub use own::{MakeController, MakeScheme, Own};
 pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, total_hvp,
@@ -83,8 +83,8 @@ pub use record::{
 pub use run::Run;
 pub use solver::{Held, Helfrich, Target};
 pub use step_control::StepControl;
-pub use steps::{Order, StepRule, TimeSteps};
 pub use stop::{Progress, Stop, StopRule, StopWhen};
 pub use storage::Storage;
 pub use store::{Checkpoints, METRICS, Store, TIMINGS, dimension, ended, initial, notes, records};
+pub use time_steps::{Order, StepRule, TimeSteps};
 pub use trajectory::Trajectory;

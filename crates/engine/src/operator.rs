@@ -33,13 +33,13 @@ pub enum Method {
     Own,
 }
 
-/// How the energy of a time step of Willmore flow is weighted.
+/// How a time step of Willmore flow is formulated: the weights of its energy, and the recipe of the network inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Display, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[cfg_attr(feature = "clap", value(rename_all = "snake_case"))]
 #[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
-pub enum Scheme {
+pub enum Formulation {
     /// Calibrated, with the operator of the accurate recipe in place of the paper's
     Accurate,
     /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
@@ -49,11 +49,11 @@ pub enum Scheme {
     Paper,
 }
 
-impl Scheme {
-    /// All schemes, in the order of legends.
+impl Formulation {
+    /// All formulations, in the order of legends.
     pub const ALL: [Self; 3] = [Self::Paper, Self::Calibrated, Self::Accurate];
 
-    /// The recipe of the shipped networks that this scheme uses.
+    /// The recipe of the shipped networks that this formulation uses.
     pub fn shipped(self) -> Shipped {
         match self {
             Self::Paper | Self::Calibrated => Shipped::Paper,
@@ -76,46 +76,66 @@ impl Method {
         }
     }
 
-    /// Name in files and metrics in a scheme.
-    pub fn key_in(self, scheme: Scheme) -> String {
-        match scheme {
-            Scheme::Paper => self.to_string(),
-            scheme => format!("{self}_{scheme}"),
-        }
-    }
-
-    /// Name in legends in a scheme.
-    pub fn label_in(self, scheme: Scheme) -> String {
-        match scheme {
-            Scheme::Paper => self.label().to_owned(),
-            Scheme::Calibrated => format!("{}, calibrated", self.label()),
-            Scheme::Accurate => "accurate operator, calibrated".to_owned(),
-        }
-    }
-
     /// Whether the method needs a trained network.
     pub fn is_learned(self) -> bool {
         self == Self::Hybrid
     }
 
-    /// The schemes that make a difference for a flow with this method: mean curvature flow has no energy to be weighted, and
+    /// The formulations that make a difference for a flow with this method: mean curvature flow has no energy to be weighted, and
     /// only operators are learned.
-    pub fn schemes(self, flow: Flow) -> &'static [Scheme] {
+    pub fn formulations(self, flow: Flow) -> &'static [Formulation] {
         match (flow, self.is_learned()) {
-            (Flow::Willmore, true) => &Scheme::ALL,
-            (Flow::Willmore, false) => &[Scheme::Paper, Scheme::Calibrated],
-            (Flow::MeanCurvature, true) => &[Scheme::Paper, Scheme::Accurate],
-            (Flow::MeanCurvature, false) => &[Scheme::Paper],
+            (Flow::Willmore, true) => &Formulation::ALL,
+            (Flow::Willmore, false) => &[Formulation::Paper, Formulation::Calibrated],
+            (Flow::MeanCurvature, true) => &[Formulation::Paper, Formulation::Accurate],
+            (Flow::MeanCurvature, false) => &[Formulation::Paper],
         }
     }
 
     /// Of these, the wanted one, or the paper's where that makes no difference; all if none is wanted.
-    pub fn chosen_schemes(self, flow: Flow, wanted: Option<Scheme>) -> Vec<Scheme> {
-        let available = self.schemes(flow);
+    pub fn chosen_formulations(self, flow: Flow, wanted: Option<Formulation>) -> Vec<Formulation> {
+        let available = self.formulations(flow);
         match wanted {
             None => available.to_vec(),
             Some(wanted) if available.contains(&wanted) => vec![wanted],
-            Some(_) => vec![Scheme::Paper],
+            Some(_) => vec![Formulation::Paper],
+        }
+    }
+}
+
+/// How a flow becomes discrete: the step of mean curvature flow inside, and the formulation of a time step with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Discretization {
+    /// How a step of mean curvature flow is approximated.
+    pub method: Method,
+    /// How a time step is formulated.
+    #[serde(rename = "scheme")]
+    pub formulation: Formulation,
+}
+
+impl Discretization {
+    /// A method in a formulation.
+    pub const fn new(method: Method, formulation: Formulation) -> Self {
+        Self {
+            method,
+            formulation,
+        }
+    }
+
+    /// Name in files and metrics.
+    pub fn key(self) -> String {
+        match self.formulation {
+            Formulation::Paper => self.method.to_string(),
+            formulation => format!("{}_{formulation}", self.method),
+        }
+    }
+
+    /// Name in legends.
+    pub fn label(self) -> String {
+        match self.formulation {
+            Formulation::Paper => self.method.label().to_owned(),
+            Formulation::Calibrated => format!("{}, calibrated", self.method.label()),
+            Formulation::Accurate => "accurate operator, calibrated".to_owned(),
         }
     }
 }
@@ -160,13 +180,11 @@ pub fn quarter_square(eps_over_h: f64) -> f64 {
 /// The step of mean curvature flow of a case, with the weights of its energy.
 #[derive(Clone, derive_more::Debug)]
 pub struct Operator<const D: usize> {
-    /// How the step of mean curvature flow is computed.
-    pub method: Method,
-    /// How the energy is weighted.
-    pub scheme: Scheme,
+    /// Its method and formulation.
+    pub discretization: Discretization,
     /// The calibration factors by which the terms of the energy are divided.
     pub factors: Factors,
-    /// The response of the step to curvature ([`mean_curvature::Calibration::response`]); 1 in the paper's scheme.
+    /// The response of the step to curvature ([`mean_curvature::Calibration::response`]); 1 in the paper's formulation.
     pub response: f64,
     /// How the linear systems of implicit finite elements are solved.
     pub linear: LinearSolver,
@@ -181,10 +199,9 @@ pub struct Operator<const D: usize> {
 }
 
 impl<const D: usize> Operator<D> {
-    fn plain(method: Method, scheme: Scheme) -> Self {
+    fn plain(discretization: Discretization) -> Self {
         Self {
-            method,
-            scheme,
+            discretization,
             factors: Factors::PAPER,
             response: 1.0,
             linear: LinearSolver::default(),
@@ -195,16 +212,16 @@ impl<const D: usize> Operator<D> {
         }
     }
 
-    /// A learned operator with the network that [`Networks::find`] has for the scheme: the calibrated scheme takes its odd part.
+    /// A learned operator with the network that [`Networks::find`] has for the formulation: the calibrated one takes its odd part.
     ///
     /// # Errors
     /// [`Error::Model`] if the step cannot be calibrated.
-    pub fn learned(scheme: Scheme, mut named: NamedNetwork) -> Result<Self, Error> {
-        let mut operator = Self::plain(Method::Hybrid, scheme);
-        if scheme != Scheme::Paper {
+    pub fn learned(formulation: Formulation, mut named: NamedNetwork) -> Result<Self, Error> {
+        let mut operator = Self::plain(Discretization::new(Method::Hybrid, formulation));
+        if formulation != Formulation::Paper {
             operator.calibrate(&named.network.calibration()?);
         }
-        if scheme == Scheme::Calibrated {
+        if formulation == Formulation::Calibrated {
             // The odd part has the same factors to first order in its difference to the whole.
             named.network = named.network.odd_part();
         }
@@ -213,7 +230,7 @@ impl<const D: usize> Operator<D> {
         Ok(operator)
     }
 
-    /// A step of one's own on the whole grid of a case, with its calibration in the calibrated scheme ([`MeanCurvatureStep::calibrate`]).
+    /// A step of one's own on the whole grid of a case, with its calibration in the calibrated formulation ([`MeanCurvatureStep::calibrate`]).
     pub fn own(
         step: impl MeanCurvatureStep<D> + 'static,
         calibration: Option<&Calibration>,
@@ -223,8 +240,8 @@ impl<const D: usize> Operator<D> {
 
     /// The same with a step that is shared.
     pub fn shared(step: Arc<dyn MeanCurvatureStep<D>>, calibration: Option<&Calibration>) -> Self {
-        let scheme = calibration.map_or(Scheme::Paper, |_| Scheme::Calibrated);
-        let mut operator = Self::plain(Method::Own, scheme);
+        let formulation = calibration.map_or(Formulation::Paper, |_| Formulation::Calibrated);
+        let mut operator = Self::plain(Discretization::new(Method::Own, formulation));
         if let Some(calibration) = calibration {
             operator.calibrate(calibration);
         }
@@ -240,18 +257,17 @@ impl<const D: usize> Operator<D> {
     /// # Panics
     /// If the method is another one.
     pub fn finite_elements(
-        method: Method,
-        scheme: Scheme,
+        discretization: Discretization,
         grid: &Grid<D>,
         scales: &Scales,
     ) -> Result<Self, Error> {
         let elements = [Method::FeImplicit, Method::FeSemi];
         assert!(
-            elements.contains(&method),
+            elements.contains(&discretization.method),
             "finite elements are implicit or semi-implicit"
         );
-        let mut operator = Self::plain(method, scheme);
-        if scheme != Scheme::Paper {
+        let mut operator = Self::plain(discretization);
+        if discretization.formulation != Formulation::Paper {
             operator.calibrate(&operator.elements(grid, scales)?.calibrate()?);
         }
         Ok(operator)
@@ -261,18 +277,22 @@ impl<const D: usize> Operator<D> {
         (self.factors, self.response) = (calibration.factors, calibration.response());
     }
 
-    /// The operator of a method in a scheme: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
+    /// The operator of a discretization: [`Self::learned`] with the network that meets the need, or [`Self::finite_elements`].
     pub fn new(
-        (method, scheme): (Method, Scheme),
+        discretization: Discretization,
         networks: &Networks,
         needed: &NeededNetwork,
         grid: &Grid<D>,
         scales: &Scales,
     ) -> Result<Self, Error> {
+        let Discretization {
+            method,
+            formulation,
+        } = discretization;
         if method.is_learned() {
-            Self::learned(scheme, networks.find(scheme.shipped(), needed)?)
+            Self::learned(formulation, networks.find(formulation.shipped(), needed)?)
         } else {
-            Self::finite_elements(method, scheme, grid, scales)
+            Self::finite_elements(discretization, grid, scales)
         }
     }
 
@@ -286,25 +306,25 @@ impl<const D: usize> Operator<D> {
         self.own.as_ref()
     }
 
-    /// Name of method and scheme in legends.
+    /// Name in legends.
     pub fn label(&self) -> String {
         match &self.own {
             Some(own) => own.identity().name,
-            None => self.method.label_in(self.scheme),
+            None => self.discretization.label(),
         }
     }
 
-    /// Name of method and scheme in files and metrics.
+    /// Name in files and metrics.
     pub fn key(&self) -> String {
-        self.method.key_in(self.scheme)
+        self.discretization.key()
     }
 
     /// What a result depends on, for the identity of a case.
     pub(crate) fn identity(&self) -> Value {
         let network = |named: &NamedNetwork| json!([named.name, named.network.fingerprint()]);
         let mut identity = json!({
-            "method": self.method,
-            "scheme": self.scheme,
+            "method": self.discretization.method,
+            "scheme": self.discretization.formulation,
             "factors": self.factors,
             "half_grids": self.half_grids,
             "network": self.network().map(network),
@@ -327,7 +347,7 @@ impl<const D: usize> Operator<D> {
         scales: &Scales,
     ) -> Result<FiniteElementStep<D>, Error> {
         let (eps, step) = (scales.eps, scales.mcf_step);
-        Ok(match self.method {
+        Ok(match self.discretization.method {
             Method::FeSemi => FiniteElementStep::semi_implicit(grid, eps, step)?,
             Method::FeImplicit | Method::Hybrid | Method::Own => {
                 FiniteElementStep::implicit_with(grid, eps, step, self.linear)?

@@ -33,7 +33,7 @@ pub(crate) fn of<const D: usize>(
     device: &ComputeDevice,
 ) -> Result<Parts<D>, Error> {
     let (kind, grid, storage) = (device.kind(), case.grid(), case.operator.storage);
-    let needs_grid = match (case.flow, case.operator.method) {
+    let needs_grid = match (case.flow, case.operator.discretization.method) {
         (Flow::Willmore, Method::Hybrid | Method::Own) => None,
         (Flow::MeanCurvature, _) => Some("mean curvature flows"),
         (Flow::Willmore, _) => Some("finite elements"),
@@ -45,14 +45,14 @@ pub(crate) fn of<const D: usize>(
     let whole = !takes_bricks || storage == Storage::Dense;
     if whole {
         let nodes = grid.len();
-        Storage::check(kind, grid, (nodes, case.bytes(nodes)), takes_bricks)?;
+        Storage::check(kind, grid, nodes, case.bytes(nodes), takes_bricks)?;
     }
     let make = (MAKES.iter()).find_map(|make| make.downcast_ref::<Make<D>>());
     let made = make.expect("a case is in the plane or in space")(case, device)?;
     if !whole {
         // How many cells are stored is known only now; little is allocated yet.
         let stored = made.start.field.nodes().len();
-        Storage::check(kind, grid, (stored, case.bytes(stored)), true)?;
+        Storage::check(kind, grid, stored, case.bytes(stored), true)?;
     }
     Ok(made)
 }
@@ -119,7 +119,8 @@ fn start<const D: usize>(case: &Case<D>, problem: &Problem<D>) -> Result<State<D
     const PAYS: f64 = 0.5;
     let dense = || -> Result<_, Error> { Ok(problem.start(&case.initial.field()?)?) };
     let bricks = || problem.start_on_bricks(&case.initial);
-    let elements = [Method::FeImplicit, Method::FeSemi].contains(&case.operator.method);
+    let method = case.operator.discretization.method;
+    let elements = [Method::FeImplicit, Method::FeSemi].contains(&method);
     if case.flow == Flow::MeanCurvature || elements {
         return dense();
     }
@@ -132,9 +133,8 @@ fn start<const D: usize>(case: &Case<D>, problem: &Problem<D>) -> Result<State<D
             }
             Ok(_) | Err(Operator(_) | NoInterface | Geometry(geometry::Error::Bricks { .. })) => {
                 // Bricks are no alternative.
-                let nodes = case.grid().len();
-                let needed = (nodes, case.bytes(nodes));
-                Storage::check(problem.device.kind(), case.grid(), needed, false)?;
+                let (kind, nodes) = (problem.device.kind(), case.grid().len());
+                Storage::check(kind, case.grid(), nodes, case.bytes(nodes), false)?;
                 dense()?
             }
             Err(error) => return Err(error.into()),

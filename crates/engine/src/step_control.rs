@@ -4,9 +4,9 @@ use geometry::measure::has_interface;
 use geometry::positive;
 use solver::{Candidate, Error as StepError, State, StepRecord, StepSize, widths_between};
 
-use crate::control::Sizes;
-use crate::steps::{largest_step, least_energy};
+use crate::error_control::ControlledSteps;
 use crate::substeps::{EASY, HARD, Substeps};
+use crate::time_steps::{largest_step, least_energy};
 use crate::{
     Attempts, Case, Controller, Error, ErrorControl, Order, Record, StepRule, Stop, TimeSteps,
     Verdict,
@@ -41,7 +41,7 @@ pub struct StepControl {
     /// Substeps of the present step.
     substeps: Option<Substeps>,
     /// The size of controlled steps, and the time at which the present step is complete.
-    controller: Option<Sizes>,
+    controlled: Option<ControlledSteps>,
     due: f64,
     /// Whether sizes are held.
     holds: bool,
@@ -79,7 +79,8 @@ impl StepControl {
             Order::Controlled(control) => Some(control),
             _ => (rule == StepRule::Controlled).then(ErrorControl::default),
         };
-        let controller = control.map(|control| Sizes::new(control, case.scales.eps, largest));
+        let eps = case.scales.eps;
+        let controlled = control.map(|control| ControlledSteps::new(control, eps, largest));
         let mut control = Self {
             steps: TimeSteps { rule, ..steps },
             end: Stop::end(&case.stops).unwrap_or(f64::INFINITY),
@@ -90,7 +91,7 @@ impl StepControl {
             wanted: rule.size(1),
             size: f64::NAN,
             substeps: None,
-            controller: controller.transpose()?,
+            controlled: controlled.transpose()?,
             due: f64::INFINITY,
             holds: !case.held.is_empty(),
             attempt: None,
@@ -105,7 +106,7 @@ impl StepControl {
         self.size = self.wanted.min(self.end - self.time);
         self.due = self.time + self.size;
         // At the end nothing is left to make.
-        let substeps = self.controller.is_none() && self.size > 0.0;
+        let substeps = self.controlled.is_none() && self.size > 0.0;
         if let Some(very_first) = self.steps.first_substep.filter(|_| substeps) {
             let first = substep.min(self.size);
             let least = first.min(positive("first substep", very_first)?);
@@ -124,8 +125,8 @@ impl StepControl {
     }
 
     fn next_size(&self) -> f64 {
-        match (self.controller, self.substeps) {
-            (Some(controller), _) => controller.size(self.due - self.time),
+        match (self.controlled, self.substeps) {
+            (Some(controlled), _) => controlled.size(self.due - self.time),
             (None, Some(substeps)) => substeps.size(),
             (None, None) => self.size,
         }
@@ -133,12 +134,12 @@ impl StepControl {
 
     /// The size with which a controlled step is made again, if it was too long.
     fn shorter(&self, made: &StepRecord) -> Option<f64> {
-        self.controller?.shorter(made)
+        self.controlled?.shorter(made)
     }
 
     /// How often that size may be halved where a minimization fails.
     fn halvings(&self) -> u32 {
-        let adapts = matches!(self.steps.rule, StepRule::ByEnergy(_)) || self.controller.is_some();
+        let adapts = matches!(self.steps.rule, StepRule::ByEnergy(_)) || self.controlled.is_some();
         let of_steps = if adapts { HALVINGS } else { 0 };
         (self.substeps).map_or(of_steps, |substeps| substeps.halvings())
     }
@@ -181,8 +182,8 @@ impl StepControl {
         });
         self.time = record.time;
         let mut substep = f64::INFINITY;
-        if let Some(controller) = &mut self.controller {
-            controller.accept(record);
+        if let Some(controlled) = &mut self.controlled {
+            controlled.accept(record);
             if self.wanted.is_finite() && self.due - self.time > 1e-12 * self.due {
                 return Ok(false);
             }

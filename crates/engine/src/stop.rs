@@ -8,7 +8,7 @@ use geometry::{PhaseField, Stored};
 use serde::{Deserialize, Serialize};
 use solver::StepRecord;
 
-use crate::steps::{largest_step, least_energy};
+use crate::time_steps::{largest_step, least_energy};
 use crate::{Current, DISPLACEMENT, Record};
 
 /// A reason to end; a flow ends with the first that holds.

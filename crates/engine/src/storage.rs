@@ -49,7 +49,8 @@ impl Storage {
     pub fn check<const D: usize>(
         device: DeviceKind,
         grid: &Grid<D>,
-        (stored, needed): (usize, f64),
+        stored: usize,
+        needed: f64,
         takes_bricks: bool,
     ) -> Result<(), Error> {
         if !device.is_cpu() {
@@ -93,7 +94,7 @@ mod tests {
         let check = |grid: &Grid<3>| {
             let nodes = grid.len();
             let needed = Storage::bytes(Flow::Willmore, nodes, nodes);
-            Storage::check(DeviceKind::Flex, grid, (nodes, needed), true)
+            Storage::check(DeviceKind::Flex, grid, nodes, needed, true)
         };
         assert!(check(&small).is_ok());
         // Ten thousand cells a side take 300 TB, which no machine has.

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use geometry::{Bricks, Grid, NodeSet, Nodes, PhaseField, Stored};
 use operators::ComputeDevice;
-use runs::{RunDirectory, State as Packed, StoredRun};
+use runs::{CheckpointState, RunDirectory, StoredRun};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -95,7 +95,8 @@ impl Store {
         stored: StoredRun,
         case: Case<D>,
         device: &ComputeDevice,
-        (checkpoints, notes): (Checkpoints, Value),
+        checkpoints: Checkpoints,
+        notes: Value,
         ends: impl Fn(&str) -> bool,
     ) -> Result<(Self, Run<D>), Error> {
         let stops: Vec<Stop> = read(&stored, &stored.state().notes["case"]["stops"])?;
@@ -205,7 +206,7 @@ struct Remembered {
     phase_values: [f64; 2],
 }
 
-fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>, Error> {
+fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<CheckpointState<'a>, Error> {
     let state = &run.state;
     let fields = state.memory.fields.iter();
     let fields = fields.map(|(name, field)| {
@@ -227,8 +228,8 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>
         "memory": { "fields": fields, "numbers": state.memory.numbers },
     });
     let initial = &run.case.initial;
-    let mut packed =
-        Packed::new(run.records.len() as u64, notes).with_array("initial", initial.values());
+    let mut packed = CheckpointState::new(run.records.len() as u64, notes)
+        .with_array("initial", initial.values());
     if let Some(marks) = marks(initial.nodes()) {
         packed = packed.with_array(&bricks_of("initial"), marks);
     }
@@ -246,10 +247,10 @@ fn pack<'a, const D: usize>(run: &'a Run<D>, notes: &Value) -> Result<Packed<'a>
 
 /// Adds a field, with the bricks on which it is stored, if it is on bricks.
 fn with_field<'a, const D: usize>(
-    packed: Packed<'a>,
+    packed: CheckpointState<'a>,
     name: &str,
     field: &DeviceField<D>,
-) -> Result<Packed<'a>, Error> {
+) -> Result<CheckpointState<'a>, Error> {
     let packed = match marks(field.nodes()) {
         Some(marks) => packed.with_array(&bricks_of(name), marks),
         None => packed,

@@ -202,7 +202,8 @@ fn a_run_to_a_time_is_not_extended_to_another() {
     store.finish(&run).unwrap();
     to_time.stops = vec![Stop::Time(TAU)];
     let stored = RunDirectory::open(&folder).unwrap();
-    let refused = Store::extend(stored, to_time, &device(), (every, Value::Null), |_| false);
+    let (device, notes) = (device(), Value::Null);
+    let refused = Store::extend(stored, to_time, &device, every, notes, |_| false);
     let error = refused.err().unwrap().to_string();
     assert!(error.contains("for another end time"), "{error}");
 }

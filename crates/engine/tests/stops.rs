@@ -1,7 +1,9 @@
 //! Every reason to end.
 
 use crate::common::{EPS, TAU, case, device, disc, divided, finished, grid};
-use engine::{Case, Flow, Measure, Method, Operator, Record, Run, Scales, Scheme, StepRule, Stop};
+use engine::{
+    Case, Flow, Formulation, Measure, Method, Operator, Record, Run, Scales, StepRule, Stop,
+};
 use geometry::{Field, Grid, optimal_profile};
 use model::Networks;
 use runs::Interrupt;
@@ -49,13 +51,11 @@ fn a_surface_through_the_box_may_have_little_energy() {
     let scales = Scales::of_grid(grid.spacing(), 2.0);
     let cylinder = |[x, y, _]: [f64; 3]| optimal_profile(x.hypot(y) - 0.3, scales.eps);
     let needed = scales.needs(3, grid.spacing());
-    let network = Networks::default().find(Scheme::Accurate.shipped(), &needed);
-    let operator = Operator::learned(Scheme::Accurate, network.unwrap()).unwrap();
-    let (initial, steps) = (
-        Field::from_fn(grid, cylinder),
-        (StepRule::Constant(1e-7), 1),
-    );
-    let mut case = Case::willmore("cylinder", initial, operator, scales, steps);
+    let network = Networks::default().find(Formulation::Accurate.shipped(), &needed);
+    let operator = Operator::learned(Formulation::Accurate, network.unwrap()).unwrap();
+    let initial = Field::from_fn(grid, cylinder);
+    let steps = StepRule::Constant(1e-7);
+    let mut case = Case::willmore("cylinder", initial, operator, scales, steps, 1);
     case.stops.insert(0, Stop::NoSurface);
     let mut run = Run::new(case, &device()).unwrap();
     run.advance(None, &mut [], &Interrupt::never()).unwrap();

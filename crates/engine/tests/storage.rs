@@ -3,8 +3,8 @@
 use crate::common::{EPS, TAU, case, device, disc, finished, grid, scales};
 use crate::resuming::{interrupted, resumed, trajectory};
 use engine::{
-    Case, Checkpoints, Error, Flow, Helfrich, Method, Operator, Run, Samples, Scheme, StepRule,
-    Stop, Storage, Store,
+    Case, Checkpoints, Discretization, Error, Flow, Formulation, Helfrich, Method, Operator, Run,
+    Samples, StepRule, Stop, Storage, Store,
 };
 use geometry::measure::l2_distance;
 use geometry::shapes::Ball;
@@ -18,7 +18,7 @@ fn stored(storage: Storage, radius: f64) -> Case<2> {
     let initial = phase_field(grid(128), &Ball::new([0.0; 2], radius).unwrap(), EPS).unwrap();
     let initial = initial.map(|u| if u.abs() < 1.0 - 1e-7 { u } else { u.signum() });
     let needed = scales().needs(2, 1.0 / 128.0);
-    let accurate = (Method::Hybrid, Scheme::Accurate);
+    let accurate = Discretization::new(Method::Hybrid, Formulation::Accurate);
     let networks = Networks::default();
     let operator = Operator::new(accurate, &networks, &needed, initial.grid(), &scales());
     let mut operator = operator.unwrap();

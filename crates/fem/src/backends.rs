@@ -15,15 +15,15 @@ fn values<B: Backend>(x: FloatTensor<B>) -> Vec<f64> {
         .expect("converted to doubles above")
 }
 
-/// An operation of the scheme of this number, by its identifier; the result has the place, shape and precision of the first input.
+/// An operation of the finite elements of this number, by its identifier; the result has the place, shape and precision of the first input.
 pub(crate) fn on_host<B: Backend>(
     id: &str,
     inputs: Vec<FloatTensor<B>>,
-    scheme: u64,
+    elements: u64,
 ) -> FloatTensor<B> {
     let (shape, dtype, device) = (inputs[0].shape(), inputs[0].dtype(), inputs[0].device());
     let inputs: Vec<_> = inputs.into_iter().map(values::<B>).collect();
-    let data = TensorData::new(host(scheme).run(id, &inputs), shape);
+    let data = TensorData::new(host(elements).run(id, &inputs), shape);
     let data = match dtype {
         DType::F64 => data,
         other => data.convert_dtype(other),
@@ -34,9 +34,9 @@ pub(crate) fn on_host<B: Backend>(
 macro_rules! on_host {
     ($backend:ty) => {
         impl FemOps for $backend {
-            fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
+            fn fem(operation: Operation<Self>, elements: u64) -> FloatTensor<Self> {
                 let (id, inputs) = operation.parts();
-                on_host::<Self>(id, inputs, scheme)
+                on_host::<Self>(id, inputs, elements)
             }
         }
     };

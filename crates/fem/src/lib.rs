@@ -50,16 +50,16 @@ mod backends;
 mod direct;
 pub mod element;
 mod error;
+mod finite_elements;
 mod ops;
 mod planar;
 mod rules;
-mod scheme;
 mod step;
 
 pub use error::Error;
+pub use finite_elements::{FiniteElements, Statistics};
 pub use ops::{FemOps, Operation};
 pub use rules::extensions;
-pub use scheme::{Scheme, Statistics};
 pub use step::FiniteElementStep;
 
 /// How linear systems of the implicit step are solved.

@@ -1,6 +1,6 @@
 //! The finite-element operations as a Burn backend trait, with their autodiff and capture implementations.
 //!
-//! A scheme has a number, under which it is found again when an operation runs: operations carry numbers only.
+//! Finite elements on a grid have a number, under which they are found again when an operation runs: operations carry numbers only.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,7 +14,7 @@ use burn_ir::ScalarIr;
 use operators::recording::{Pullback, captured, on_tape};
 
 use self::Operation::{HeatSolve, ImplicitStep, LinearizedSolve, Mass, Product};
-use crate::Scheme;
+use crate::FiniteElements;
 
 pub(crate) const MASS: &str = "fem::mass";
 pub(crate) const HEAT: &str = "fem::heat_solve";
@@ -22,14 +22,14 @@ pub(crate) const PRODUCT: &str = "fem::product";
 pub(crate) const IMPLICIT: &str = "fem::implicit_step";
 pub(crate) const LINEARIZED: &str = "fem::linearized_solve";
 
-/// A scheme of any dimension, as operations see it.
+/// Finite elements of any dimension, as operations see them.
 pub(crate) trait Host: Send + Sync {
     /// The operation of this identifier.
     fn run(&self, id: &str, inputs: &[Vec<f64>]) -> Vec<f64>;
     fn reaction(&self) -> f64;
 }
 
-impl<const D: usize> Host for Scheme<D> {
+impl<const D: usize> Host for FiniteElements<D> {
     fn run(&self, id: &str, inputs: &[Vec<f64>]) -> Vec<f64> {
         match (id, inputs) {
             (MASS, [x]) => self.mass(x),
@@ -37,42 +37,45 @@ impl<const D: usize> Host for Scheme<D> {
             (PRODUCT, [a, b, c]) => self.product(a, b, c),
             (IMPLICIT, [u]) => self.or_nan(self.implicit_step(u)),
             (LINEARIZED, [v, g]) => self.or_nan(self.linearized_solve(v, g)),
-            _ => unreachable!("schemes have no operation {id} of {} inputs", inputs.len()),
+            _ => unreachable!(
+                "finite elements have no operation {id} of {} inputs",
+                inputs.len()
+            ),
         }
     }
 
     fn reaction(&self) -> f64 {
-        Scheme::reaction(self)
+        FiniteElements::reaction(self)
     }
 }
 
-/// The schemes in use, by number.
+/// The finite elements in use, by number.
 fn registry() -> MutexGuard<'static, BTreeMap<u64, Weak<dyn Host>>> {
-    static SCHEMES: Mutex<BTreeMap<u64, Weak<dyn Host>>> = Mutex::new(BTreeMap::new());
+    static IN_USE: Mutex<BTreeMap<u64, Weak<dyn Host>>> = Mutex::new(BTreeMap::new());
     // A map of weak references is valid wherever a panic could have left it.
-    SCHEMES.lock().unwrap_or_else(PoisonError::into_inner)
+    IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The number of a scheme, under which it is found as long as it has an owner.
-pub(crate) fn register<const D: usize>(scheme: &Arc<Scheme<D>>) -> u64 {
+/// The number of finite elements, under which they are found as long as they have an owner.
+pub(crate) fn register<const D: usize>(elements: &Arc<FiniteElements<D>>) -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let host: Arc<dyn Host> = scheme.clone();
-    let mut schemes = registry();
-    schemes.retain(|_, scheme| scheme.strong_count() > 0);
-    schemes.insert(number, Arc::downgrade(&host));
+    let host: Arc<dyn Host> = elements.clone();
+    let mut in_use = registry();
+    in_use.retain(|_, elements| elements.strong_count() > 0);
+    in_use.insert(number, Arc::downgrade(&host));
     number
 }
 
-/// The scheme of that number.
+/// The finite elements of that number.
 pub(crate) fn host(number: u64) -> Arc<dyn Host> {
     registry()
         .get(&number)
         .and_then(Weak::upgrade)
-        .expect("a step keeps its scheme alive as long as graphs of it run")
+        .expect("a step keeps its elements alive as long as graphs of it run")
 }
 
-/// An operation of a finite-element scheme on its arguments.
+/// An operation of finite elements on its arguments.
 #[derive(ExtensionType)]
 pub enum Operation<B: Backend> {
     /// `M x`.
@@ -100,7 +103,7 @@ impl<B: Backend> Operation<B> {
     }
 }
 
-/// Finite-element schemes on a backend; their operations are closed under differentiation in both modes.
+/// Finite elements on a backend; their operations are closed under differentiation in both modes.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -109,22 +112,22 @@ impl<B: Backend> Operation<B> {
     Autodiff
 )]
 pub trait FemOps: Backend {
-    /// An operation of the scheme of this number; the result has the shape of the arguments.
-    fn fem(#[extension_type] operation: Operation<Self>, scheme: u64) -> FloatTensor<Self>;
+    /// An operation of the finite elements of this number; the result has the shape of the arguments.
+    fn fem(#[extension_type] operation: Operation<Self>, elements: u64) -> FloatTensor<Self>;
 }
 
 impl FemOps for CaptureBackend {
-    fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
+    fn fem(operation: Operation<Self>, elements: u64) -> FloatTensor<Self> {
         let (id, inputs) = operation.parts();
         let shape = inputs[0].shape();
-        captured(id, inputs, shape, vec![ScalarIr::UInt(scheme)])
+        captured(id, inputs, shape, vec![ScalarIr::UInt(elements)])
     }
 }
 
 impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
     #[allow(clippy::redundant_closure_for_method_calls)] // the tensor's type cannot be named
-    fn fem(operation: Operation<Self>, scheme: u64) -> FloatTensor<Self> {
-        let run = move |operation| B::fem(operation, scheme);
+    fn fem(operation: Operation<Self>, elements: u64) -> FloatTensor<Self> {
+        let run = move |operation| B::fem(operation, elements);
         match operation {
             // Self-adjoint.
             Mass(x) => {
@@ -162,7 +165,7 @@ impl<B: Backend + FemOps, C: CheckpointStrategy> FemOps for Autodiff<B, C> {
                 let y = run(LinearizedSolve(v.clone(), g));
                 let (at, solution) = (v.clone(), y.clone());
                 let to_v = Pullback::new(move |w| {
-                    let factor = -6.0 * host(scheme).reaction();
+                    let factor = -6.0 * host(elements).reaction();
                     let z = run(LinearizedSolve(at.clone(), w));
                     let product = run(Product(at.clone(), solution.clone(), z));
                     B::float_mul_scalar(product, factor.into())

@@ -11,7 +11,7 @@ use mean_curvature::PlanarStep;
 use mean_curvature::calibration::PlanarScales;
 
 use crate::element::gauss_points;
-use crate::scheme::Kind;
+use crate::finite_elements::TimeDiscretization;
 
 /// A limit that no well-posed step comes near.
 const NEWTON: usize = 40;
@@ -20,7 +20,7 @@ const CONVERGED: f64 = 1e-13;
 
 /// A finite-element step on planes with one normal.
 pub(crate) struct ElementsOnPlanes {
-    kind: Kind,
+    discretization: TimeDiscretization,
     scales: PlanarScales,
     /// `9/8 tautilde / eps^2`.
     reaction: f64,
@@ -46,7 +46,12 @@ enum Part<'a> {
 
 impl ElementsOnPlanes {
     /// A step with these ratios on planes with this normal, whose entries must not be negative.
-    pub(crate) fn new(kind: Kind, eps_over_h: f64, step_over_h2: f64, normal: &[isize]) -> Self {
+    pub(crate) fn new(
+        discretization: TimeDiscretization,
+        eps_over_h: f64,
+        step_over_h2: f64,
+        normal: &[isize],
+    ) -> Self {
         let dimension = normal.len();
         let square: f64 = normal.iter().map(|a| (a * a) as f64).sum();
         let count = 1_usize << dimension;
@@ -87,7 +92,7 @@ impl ElementsOnPlanes {
             (length - along * along / square) / (2.0 * (dimension - 1) as f64)
         });
         Self {
-            kind,
+            discretization,
             scales: PlanarScales {
                 eps: eps_over_h,
                 mcf_step: step_over_h2,
@@ -168,7 +173,7 @@ impl ElementsOnPlanes {
     fn left<'a>(&self, v: &'a Col<f64>) -> Vec<Part<'a>> {
         let r = self.reaction;
         let mut parts = vec![Part::Mass(1.0), Part::Stiffness(self.scales.mcf_step)];
-        if self.kind == Kind::Implicit {
+        if self.discretization == TimeDiscretization::Implicit {
             parts.extend([Part::Mass(-r), Part::Weighted(3.0 * r, v)]);
         }
         parts
@@ -177,9 +182,11 @@ impl ElementsOnPlanes {
     /// The nodal factors before the mass matrix in the derivative of the right side in `u`.
     fn right(&self, u: &Col<f64>) -> Col<f64> {
         let r = self.reaction;
-        match self.kind {
-            Kind::Implicit => Col::full(u.nrows(), 1.0),
-            Kind::SemiImplicit => Col::from_fn(u.nrows(), |i| 1.0 + r - 3.0 * r * u[i] * u[i]),
+        match self.discretization {
+            TimeDiscretization::Implicit => Col::full(u.nrows(), 1.0),
+            TimeDiscretization::SemiImplicit => {
+                Col::from_fn(u.nrows(), |i| 1.0 + r - 3.0 * r * u[i] * u[i])
+            }
         }
     }
 
@@ -190,7 +197,7 @@ impl ElementsOnPlanes {
         let solve = |parts: &[Part], right: &Col<f64>| {
             PartialPivLu::new(self.matrix(planes, parts).as_ref()).solve(right)
         };
-        if self.kind == Kind::SemiImplicit {
+        if self.discretization == TimeDiscretization::SemiImplicit {
             let g = Col::from_fn(planes, |i| u[i] * (1.0 + r - r * u[i] * u[i]));
             return Ok(solve(
                 &self.left(u),
@@ -266,13 +273,20 @@ mod tests {
     use geometry::shapes::Ball;
     use geometry::{Field, Grid};
 
-    const KINDS: [Kind; 2] = [Kind::Implicit, Kind::SemiImplicit];
+    const DISCRETIZATIONS: [TimeDiscretization; 2] = [
+        TimeDiscretization::Implicit,
+        TimeDiscretization::SemiImplicit,
+    ];
 
-    fn grid_step<const D: usize>(kind: Kind, grid: &Grid<D>, eps: f64) -> FiniteElementStep<D> {
+    fn grid_step<const D: usize>(
+        discretization: TimeDiscretization,
+        grid: &Grid<D>,
+        eps: f64,
+    ) -> FiniteElementStep<D> {
         let step = grid.spacing().powi(2);
-        match kind {
-            Kind::Implicit => FiniteElementStep::implicit(grid, eps, step),
-            Kind::SemiImplicit => FiniteElementStep::semi_implicit(grid, eps, step),
+        match discretization {
+            TimeDiscretization::Implicit => FiniteElementStep::implicit(grid, eps, step),
+            TimeDiscretization::SemiImplicit => FiniteElementStep::semi_implicit(grid, eps, step),
         }
         .unwrap()
     }
@@ -291,20 +305,20 @@ mod tests {
             // Several periods, so that the ends do not matter in the middle.
             let planes = 9 * cells;
             let w = Col::from_fn(planes, |i| wave(i as f64));
-            for kind in KINDS {
-                let on_planes = ElementsOnPlanes::new(kind, 2.0, 1.0, &[1; D]);
+            for discretization in DISCRETIZATIONS {
+                let on_planes = ElementsOnPlanes::new(discretization, 2.0, 1.0, &[1; D]);
                 let (v, _) = on_planes.linearize(&w).unwrap();
-                let scheme = grid_step(kind, &grid, eps);
-                scheme.scheme().set_tolerances(Tolerances {
+                let step = grid_step(discretization, &grid, eps);
+                step.elements().set_tolerances(Tolerances {
                     linear: 1e-13,
                     newton: 1e-13,
                     ..Tolerances::default()
                 });
-                let expected = scheme.step(&u).unwrap();
+                let expected = step.step(&u).unwrap();
                 for (i, value) in expected.values().iter().enumerate() {
                     let plane = grid.multi_index(i).iter().sum::<usize>() % cells + 4 * cells;
                     let error = (value - v[plane]).abs();
-                    assert!(error < 1e-7, "{D}D {kind:?} at {i}: {error:e}");
+                    assert!(error < 1e-7, "{D}D {discretization:?} at {i}: {error:e}");
                 }
             }
         }
@@ -316,8 +330,8 @@ mod tests {
     fn jacobians_are_derivatives() {
         let w = Col::from_fn(60, |i| (0.4 * (i as f64 - 29.3)).tanh());
         let p = Col::from_fn(60, |i| (-0.05 * (i as f64 - 31.0).powi(2)).exp());
-        for kind in KINDS {
-            let step = ElementsOnPlanes::new(kind, 2.0, 1.0, &[2, 1]);
+        for discretization in DISCRETIZATIONS {
+            let step = ElementsOnPlanes::new(discretization, 2.0, 1.0, &[2, 1]);
             let (v, jacobian) = step.linearize(&w).unwrap();
             let product = &jacobian * &p;
             let remainder = |t: f64| {
@@ -325,7 +339,7 @@ mod tests {
                 (moved - &v - &product * faer::Scale(t)).norm_l2()
             };
             let rate = (remainder(1e-2) / remainder(5e-3)).log2();
-            assert!((rate - 2.0).abs() < 0.1, "{kind:?}: {rate}");
+            assert!((rate - 2.0).abs() < 0.1, "{discretization:?}: {rate}");
         }
     }
 
@@ -338,10 +352,10 @@ mod tests {
         let radius = 90.0;
         let disc = geometry::phase_field(grid, &Ball::new([0.0, 0.0], radius).unwrap(), eps);
         let disc = disc.unwrap();
-        for kind in KINDS {
-            let moved = grid_step(kind, &grid, eps).step(&disc).unwrap();
+        for discretization in DISCRETIZATIONS {
+            let moved = grid_step(discretization, &grid, eps).step(&disc).unwrap();
             for normal in [[1_isize, 0], [1, 1]] {
-                let planes = ElementsOnPlanes::new(kind, eps, 1.0, &normal);
+                let planes = ElementsOnPlanes::new(discretization, eps, 1.0, &normal);
                 // Nodes of the grid along the normal, from the inside out, as planes of distance growing outwards.
                 let spacing = planes.scales.spacing;
                 let skip = if normal == [1, 1] { 2 } else { 1 };
@@ -364,7 +378,7 @@ mod tests {
                     let scale = 0.75 / eps;
                     assert!(
                         (found - change[k]).abs() < 0.05 * scale,
-                        "{kind:?} {normal:?} {k}: {found} {}",
+                        "{discretization:?} {normal:?} {k}: {found} {}",
                         change[k]
                     );
                 }

@@ -13,10 +13,10 @@ use mean_curvature::{
 use operators::{ComputeDevice, SpectralFilter, spectral_filter};
 use serde_json::json;
 
+use crate::finite_elements::TimeDiscretization;
 use crate::ops::{FemOps, Operation, register};
 use crate::planar::ElementsOnPlanes;
-use crate::scheme::Kind;
-use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
+use crate::{Error, FiniteElements, LinearSolver, Statistics, Tolerances};
 
 /// A finite-element step of mean curvature flow: `v[u]` of Franken, Rumpf and Wirth's nested scheme.
 ///
@@ -46,12 +46,12 @@ use crate::{Error, LinearSolver, Scheme, Statistics, Tolerances};
 /// ```
 #[derive(Clone)]
 pub struct FiniteElementStep<const D: usize> {
-    kind: Kind,
+    discretization: TimeDiscretization,
     grid: Grid<D>,
     eps: f64,
     step: f64,
-    scheme: Arc<Scheme<D>>,
-    /// Under which the scheme is registered.
+    elements: Arc<FiniteElements<D>>,
+    /// Under which they are registered.
     number: u64,
 }
 
@@ -59,41 +59,53 @@ impl<const D: usize> FiniteElementStep<D> {
     /// The implicit step of the paper: the minimizer of `eps |u - v|^2 + 2 tautilde P_eps[v]`, by Newton's method.
     ///
     /// # Errors
-    /// As [`Scheme::new`].
+    /// As [`FiniteElements::new`].
     pub fn implicit(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
-        Self::new(Kind::Implicit, grid, eps, step, LinearSolver::default())
+        Self::new(
+            TimeDiscretization::Implicit,
+            grid,
+            eps,
+            step,
+            LinearSolver::default(),
+        )
     }
 
     /// The implicit step with another solver for its linear systems.
     ///
     /// # Errors
-    /// As [`Scheme::new`].
+    /// As [`FiniteElements::new`].
     pub fn implicit_with(
         grid: &Grid<D>,
         eps: f64,
         step: f64,
         solver: LinearSolver,
     ) -> Result<Self, Error> {
-        Self::new(Kind::Implicit, grid, eps, step, solver)
+        Self::new(TimeDiscretization::Implicit, grid, eps, step, solver)
     }
 
     /// The semi-implicit step `(v - u)/tautilde = lap v - Psi'(u)/(2 eps^2)`: one circulant system, solved exactly. The explicit
     /// term is interpolated at the nodes, `M Psi'(u)`, as codes for this scheme do.
     ///
     /// # Errors
-    /// As [`Scheme::new`].
+    /// As [`FiniteElements::new`].
     pub fn semi_implicit(grid: &Grid<D>, eps: f64, step: f64) -> Result<Self, Error> {
-        Self::new(Kind::SemiImplicit, grid, eps, step, LinearSolver::default())
+        Self::new(
+            TimeDiscretization::SemiImplicit,
+            grid,
+            eps,
+            step,
+            LinearSolver::default(),
+        )
     }
 
     fn new(
-        kind: Kind,
+        discretization: TimeDiscretization,
         grid: &Grid<D>,
         eps: f64,
         step: f64,
         solver: LinearSolver,
     ) -> Result<Self, Error> {
-        let scheme = Arc::new(Scheme::new(
+        let elements = Arc::new(FiniteElements::new(
             grid.cells(),
             grid.spacing(),
             eps,
@@ -101,29 +113,29 @@ impl<const D: usize> FiniteElementStep<D> {
             solver,
         )?);
         Ok(Self {
-            kind,
+            discretization,
             grid: *grid,
             eps,
             step,
-            number: register(&scheme),
-            scheme,
+            number: register(&elements),
+            elements,
         })
     }
 
     /// The matrices and solvers.
-    pub fn scheme(&self) -> &Scheme<D> {
-        &self.scheme
+    pub fn elements(&self) -> &FiniteElements<D> {
+        &self.elements
     }
 
     /// Work of the inner solvers so far.
     pub fn statistics(&self) -> Statistics {
-        self.scheme.statistics()
+        self.elements.statistics()
     }
 
     /// One step of mean curvature flow.
     ///
     /// # Errors
-    /// As [`Scheme::implicit_step`], values that are not finite.
+    /// As [`FiniteElements::implicit_step`], values that are not finite.
     ///
     /// # Panics
     /// If `u` lives on another grid, wherever its origin is.
@@ -132,11 +144,11 @@ impl<const D: usize> FiniteElementStep<D> {
         assert_eq!(
             size(u.grid()),
             size(&self.grid),
-            "the phase field lives on another grid than the scheme"
+            "the phase field lives on another grid than the elements"
         );
-        let values = match self.kind {
-            Kind::Implicit => self.scheme.implicit_step(u.values())?,
-            Kind::SemiImplicit => self.scheme.semi_implicit_step(u.values()),
+        let values = match self.discretization {
+            TimeDiscretization::Implicit => self.elements.implicit_step(u.values())?,
+            TimeDiscretization::SemiImplicit => self.elements.semi_implicit_step(u.values()),
         };
         Ok(Field::from_values(*u.grid(), values)?)
     }
@@ -150,7 +162,7 @@ impl<const D: usize> FiniteElementStep<D> {
         let v = self.step(u)?;
         let pairs = v.values().iter().zip(u.values());
         let motion: Vec<f64> = pairs.map(|(v, u)| v - u).collect();
-        let mass = self.scheme.mass(&motion);
+        let mass = self.elements.mass(&motion);
         let square: f64 = motion.iter().zip(mass).map(|(a, b)| a * b).sum();
         Ok(self.eps / (2.0 * self.step * self.step) * square * self.grid.cell_volume())
     }
@@ -162,20 +174,21 @@ impl<const D: usize> FiniteElementStep<D> {
     pub fn calibrate(&self) -> Result<Calibration, mean_curvature::Error> {
         let h = self.grid.spacing();
         let (eps, step) = (self.eps / h, self.step / (h * h));
-        let on_planes = |normal: &[isize]| ElementsOnPlanes::new(self.kind, eps, step, normal);
+        let on_planes =
+            |normal: &[isize]| ElementsOnPlanes::new(self.discretization, eps, step, normal);
         mean_curvature::calibrate(mean_curvature::normals(D), on_planes)
     }
 
     /// The derivative of the step at `u` in direction `p`, given `v = v[u]`, as a Burn graph: `A(v)^-1 M p` for the implicit
     /// step.
     pub fn derivative(&self, u: Tensor<D>, v: Tensor<D>, p: Tensor<D>) -> Tensor<D> {
-        match self.kind {
-            Kind::Implicit => {
+        match self.discretization {
+            TimeDiscretization::Implicit => {
                 let (v, right) = (v.into_dispatch(), self.mass(p).into_dispatch());
                 self.run(Operation::LinearizedSolve(v, right))
             }
-            Kind::SemiImplicit => {
-                let r = self.scheme.reaction();
+            TimeDiscretization::SemiImplicit => {
+                let r = self.elements.reaction();
                 let slope = (u.clone() * u) * (-3.0 * r) + (1.0 + r);
                 self.heat_solve(self.mass(slope * p))
             }
@@ -193,10 +206,10 @@ impl<const D: usize> FiniteElementStep<D> {
 
 impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
     fn apply(&self, u: Tensor<D>) -> Tensor<D> {
-        match self.kind {
-            Kind::Implicit => self.run(Operation::ImplicitStep(u.into_dispatch())),
-            Kind::SemiImplicit => {
-                let r = self.scheme.reaction();
+        match self.discretization {
+            TimeDiscretization::Implicit => self.run(Operation::ImplicitStep(u.into_dispatch())),
+            TimeDiscretization::SemiImplicit => {
+                let r = self.elements.reaction();
                 let cubic = u.clone() * u.clone() * u.clone();
                 self.heat_solve(self.mass(u * (1.0 + r) - cubic * r))
             }
@@ -212,11 +225,11 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
     }
 
     fn identity(&self) -> Identity {
-        let name = match self.kind {
-            Kind::Implicit => "implicit finite elements",
-            Kind::SemiImplicit => "semi-implicit finite elements",
+        let name = match self.discretization {
+            TimeDiscretization::Implicit => "implicit finite elements",
+            TimeDiscretization::SemiImplicit => "semi-implicit finite elements",
         };
-        let solver = format!("{:?}", self.scheme.solver());
+        let solver = format!("{:?}", self.elements.solver());
         Identity::new(
             name,
             json!({ "eps": self.eps, "step": self.step, "solver": solver }),
@@ -231,7 +244,7 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
         let (step, shape) = (self.clone(), self.grid.shape());
         Ok(Arc::new(move |stiffness| {
             let inverse = SpectralFilter::from_symbol(&shape, |theta| {
-                let (mass, derivative) = step.scheme.phase_symbols(step.kind, theta);
+                let (mass, derivative) = step.elements.phase_symbols(step.discretization, theta);
                 1.0 / (mass * (1.0 + stiffness * (1.0 - derivative).powi(2)))
             });
             Arc::new(move |r: &Tensor<D>| spectral_filter(r.clone(), &inverse)) as PhaseInverse<D>
@@ -251,15 +264,15 @@ impl<const D: usize> MeanCurvatureStep<D> for FiniteElementStep<D> {
     /// larger than what the outer iteration looks at.
     fn set_accuracy(&self, accuracy: &Accuracy) {
         let amplification = 1.0 + accuracy.stiffness;
-        self.scheme.set_tolerances(Tolerances {
+        self.elements.set_tolerances(Tolerances {
             linear: (1e-2 * accuracy.cg_tolerance / amplification).clamp(1e-12, 1e-6),
             newton: (1e-2 * accuracy.tolerance / amplification).clamp(1e-13, 1e-8),
-            ..self.scheme.tolerances()
+            ..self.elements.tolerances()
         });
     }
 
     fn failure(&self) -> Option<StepFailure> {
-        self.scheme
+        self.elements
             .take_failure()
             .map(|error| Box::new(error) as StepFailure)
     }

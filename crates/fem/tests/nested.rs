@@ -42,7 +42,7 @@ fn steps<const D: usize>(grid: &Grid<D>) -> [FiniteElementStep<D>; 3] {
         FiniteElementStep::implicit_with(grid, eps, size, direct).unwrap(),
     ];
     for step in &steps {
-        step.scheme().set_tolerances(Tolerances {
+        step.elements().set_tolerances(Tolerances {
             linear: 1e-13,
             newton: 1e-15,
             ..Tolerances::default()
@@ -72,7 +72,7 @@ fn derivatives<const D: usize>(cells: usize) {
         // By hand, on the host.
         let field = Field::from_values(grid, u.clone()).unwrap();
         let v = step.step(&field).unwrap();
-        let square = |x: &[f64]| dot(x, &step.scheme().mass(x));
+        let square = |x: &[f64]| dot(x, &step.elements().mass(x));
         let minus =
             |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
         let expected =
@@ -151,27 +151,27 @@ fn gradients_and_hessians_are_right_in_three_dimensions() {
 fn linearized_steps_are_self_adjoint() {
     let grid = Grid::<2>::centred(24, 1.0).unwrap();
     for step in steps(&grid) {
-        let scheme = step.scheme();
+        let elements = step.elements();
         let v = ball(grid, 0.3, 2.0 * grid.spacing());
         let (a, b) = (noise(grid.len(), 1), noise(grid.len(), 2));
         let pairs = [
             (
-                scheme.linearized(v.values(), &a),
-                scheme.linearized(v.values(), &b),
+                elements.linearized(v.values(), &a),
+                elements.linearized(v.values(), &b),
             ),
             (
-                scheme.linearized_solve(v.values(), &a).unwrap(),
-                scheme.linearized_solve(v.values(), &b).unwrap(),
+                elements.linearized_solve(v.values(), &a).unwrap(),
+                elements.linearized_solve(v.values(), &b).unwrap(),
             ),
-            (scheme.heat_solve(&a), scheme.heat_solve(&b)),
-            (scheme.mass(&a), scheme.mass(&b)),
+            (elements.heat_solve(&a), elements.heat_solve(&b)),
+            (elements.mass(&a), elements.mass(&b)),
         ];
         for (xa, xb) in pairs {
             let scale = (dot(&xa, &xa) * dot(&b, &b)).sqrt();
             assert!((dot(&xa, &b) - dot(&a, &xb)).abs() < 1e-12 * scale);
         }
-        let x = scheme.linearized_solve(v.values(), &a).unwrap();
-        let back = scheme.linearized(v.values(), &x);
+        let x = elements.linearized_solve(v.values(), &a).unwrap();
+        let back = elements.linearized(v.values(), &x);
         let error: Vec<f64> = back.iter().zip(&a).map(|(x, y)| x - y).collect();
         assert!(dot(&error, &error) < 1e-22 * dot(&a, &a));
     }

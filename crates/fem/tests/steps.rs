@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use fem::{Error, FiniteElementStep, LinearSolver, Scheme, Tolerances};
+use fem::{Error, FiniteElementStep, FiniteElements, LinearSolver, Tolerances};
 use geometry::exact::mean_curvature_radius;
 use geometry::measure::l2_distance;
 use geometry::shapes::{Ball, Torus};
@@ -132,8 +132,10 @@ fn conjugate_gradients_and_cholesky_agree() {
     let (a, b) = (iterative.step(&u).unwrap(), direct.step(&u).unwrap());
     assert!(l2_distance(&a, &b).unwrap() < 1e-11);
     let (x, y) = (
-        iterative.scheme().linearized_solve(a.values(), u.values()),
-        direct.scheme().linearized_solve(a.values(), u.values()),
+        iterative
+            .elements()
+            .linearized_solve(a.values(), u.values()),
+        direct.elements().linearized_solve(a.values(), u.values()),
     );
     let (x, y) = (x.unwrap(), y.unwrap());
     assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-8));
@@ -294,22 +296,23 @@ fn failures_are_typed_and_carry_their_numbers() {
         (16, 0.1, 0.1, 0.0),
     ] {
         let solver = LinearSolver::default();
-        let error = Scheme::<2>::new(cells, spacing, eps, size, solver)
+        let error = FiniteElements::<2>::new(cells, spacing, eps, size, solver)
             .err()
             .unwrap();
         assert!(matches!(error, Error::Geometry(_)), "{error}");
     }
-    let scheme = Scheme::<2>::new(16, 1.0 / 16.0, eps, 0.002, LinearSolver::default()).unwrap();
+    let elements =
+        FiniteElements::<2>::new(16, 1.0 / 16.0, eps, 0.002, LinearSolver::default()).unwrap();
     let mut broken = vec![0.5; 256];
     broken[7] = f64::NAN;
-    let error = scheme.implicit_step(&broken).unwrap_err();
+    let error = elements.implicit_step(&broken).unwrap_err();
     assert!(matches!(error, Error::NonFinite { .. }), "{error}");
-    scheme.set_tolerances(Tolerances {
+    elements.set_tolerances(Tolerances {
         iterations: 3,
         ..Tolerances::default()
     });
     let rough: Vec<f64> = (0..256).map(|i| f64::from(i * 7919 % 13) / 13.0).collect();
-    let error = scheme.linearized_solve(&rough, &rough).unwrap_err();
+    let error = elements.linearized_solve(&rough, &rough).unwrap_err();
     let Error::NotConverged {
         iterations,
         residual,

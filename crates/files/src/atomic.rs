@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use crate::{Disk, Error, Storage};
+use crate::{Disk, Error, FileSystem};
 
 /// How the names of temporary files begin.
 pub const TEMPORARY_PREFIX: &str = ".partial-";
@@ -22,9 +22,9 @@ pub fn write_atomically(
     write_atomically_on(&Disk, path, write)
 }
 
-/// [`write_atomically`] on another storage than the disk itself.
+/// [`write_atomically`] on another file system than the disk itself.
 pub fn write_atomically_on(
-    storage: &dyn Storage,
+    file_system: &dyn FileSystem,
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
@@ -33,14 +33,14 @@ pub fn write_atomically_on(
     let folder = folder_of(path);
     let (file, mut temporary) = tempfile::Builder::new()
         .prefix(TEMPORARY_PREFIX)
-        .make_in(folder, |path| storage.create_file(path))
+        .make_in(folder, |path| file_system.create_file(path))
         .map_err(failed("create a file beside"))?
         .into_parts();
     let store = || {
         let mut buffer = BufWriter::with_capacity(
             BUFFER,
             Stored {
-                storage,
+                file_system,
                 file,
                 path: &temporary,
             },
@@ -49,37 +49,37 @@ pub fn write_atomically_on(
         // Taken apart, or dropping the buffer would write what has just failed again.
         let (stored, _) = buffer.into_parts();
         written.map_err(failed("write"))?;
-        let flushed = storage.sync_file(&stored.file, &temporary);
+        let flushed = file_system.sync_file(&stored.file, &temporary);
         flushed.map_err(failed("flush to disk"))?;
         // Closed before it is renamed, which not every system does with open files.
         drop(stored);
-        (storage.rename(&temporary, path)).map_err(failed("replace"))
+        (file_system.rename(&temporary, path)).map_err(failed("replace"))
     };
     let stored = store();
-    // By hand, so that the storage knows. Only a panic above leaves it to the destructor.
+    // By hand, so that the file system knows. Only a panic above leaves it to the destructor.
     temporary.disable_cleanup(true);
     if stored.is_err() {
         // The first error is the one to report.
-        let _ = storage.remove(&temporary);
+        let _ = file_system.remove(&temporary);
     }
     stored?;
-    (storage.sync_folder(folder)).map_err(failed("flush the folder of"))
+    (file_system.sync_folder(folder)).map_err(failed("flush the folder of"))
 }
 
 /// Makes a folder that lasts, and those that it is in, unless they are there. Something else of that name is an error.
-pub fn make_folders_on(storage: &dyn Storage, path: impl AsRef<Path>) -> Result<(), Error> {
+pub fn make_folders_on(file_system: &dyn FileSystem, path: impl AsRef<Path>) -> Result<(), Error> {
     let path = path.as_ref();
     if path.as_os_str().is_empty() || path.is_dir() {
         return Ok(());
     }
     let folder = folder_of(path);
-    make_folders_on(storage, folder)?;
-    match storage.create_folder(path) {
+    make_folders_on(file_system, folder)?;
+    match file_system.create_folder(path) {
         // Somebody else was faster.
         Err(e) if e.kind() == io::ErrorKind::AlreadyExists && path.is_dir() => return Ok(()),
         result => result.map_err(Error::of("create the folder", path))?,
     }
-    (storage.sync_folder(folder)).map_err(Error::of("flush the folder of", path))
+    (file_system.sync_folder(folder)).map_err(Error::of("flush the folder of", path))
 }
 
 /// The bytes of a file.
@@ -107,16 +107,16 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A file on a storage, for code that writes to [`Write`].
+/// A file on a file system, for code that writes to [`Write`].
 struct Stored<'a> {
-    storage: &'a dyn Storage,
+    file_system: &'a dyn FileSystem,
     file: File,
     path: &'a Path,
 }
 
 impl Write for Stored<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.storage.write(&mut self.file, self.path, bytes)
+        self.file_system.write(&mut self.file, self.path, bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {

@@ -13,7 +13,7 @@
 //!   one, never a part.
 //! - Temporary names begin with [`TEMPORARY_PREFIX`], and nothing else does. They are removed when
 //!   writing fails; only a process that is killed, or a power failure, leaves them behind.
-//! - Everything that changes the disk goes through [`Storage`], so that tests can let every single
+//! - Everything that changes the disk goes through [`FileSystem`], so that tests can let every single
 //!   operation fail. Its errors are those of the operating system, of which [`Error`] says where they came from.
 //! - [`Number`] reads the numbers of binary formats.
 
@@ -22,8 +22,8 @@
 mod atomic;
 mod checksum;
 mod error;
+mod file_system;
 mod number;
-mod storage;
 mod text;
 
 pub use atomic::{
@@ -31,6 +31,6 @@ pub use atomic::{
 };
 pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
+pub use file_system::{Disk, FileSystem};
 pub use number::Number;
-pub use storage::{Disk, Storage};
 pub use text::{shortened, with_causes};

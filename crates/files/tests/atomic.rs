@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use files::{Disk, Storage};
+use files::{Disk, FileSystem};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
@@ -32,7 +32,7 @@ impl Failing {
     }
 }
 
-impl Storage for Failing {
+impl FileSystem for Failing {
     fn create_file(&self, path: &Path) -> io::Result<fs::File> {
         self.next()?;
         Disk.create_file(path)
@@ -71,12 +71,12 @@ fn every_step_may_fail() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state");
         fs::write(&path, "old").unwrap();
-        let storage = Failing {
+        let file_system = Failing {
             at,
             count: AtomicUsize::new(0),
         };
-        let error =
-            files::write_atomically_on(&storage, &path, |out| out.write_all(b"new")).unwrap_err();
+        let error = files::write_atomically_on(&file_system, &path, |out| out.write_all(b"new"))
+            .unwrap_err();
         assert_eq!(error.action, action);
         assert_eq!(error.path, path);
         assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);

@@ -241,7 +241,8 @@ impl<'a> Fuzz<'a> {
         }
     }
 
-    fn bytes(&self, (file, changes, repaired): &Case) -> Vec<u8> {
+    fn bytes(&self, case: &Case) -> Vec<u8> {
+        let (file, changes, repaired) = case;
         let mut bytes = file.get(&self.material.files).clone();
         for change in changes {
             change.apply(&mut bytes, &self.material);

@@ -36,7 +36,15 @@ pub enum Right {
 }
 
 /// One operation with its operands. These are numbered: the inputs, then the results of earlier instructions.
-pub type Instruction = (Arithmetic, usize, Right);
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instruction {
+    /// The operation.
+    pub arithmetic: Arithmetic,
+    /// The number of the left operand.
+    pub left: usize,
+    /// The right operand.
+    pub right: Right,
+}
 
 /// What becomes of an operand in the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,12 +68,13 @@ impl Elementwise {
     fn encode(&self) -> Vec<ScalarIr> {
         let place = |operand: usize| ScalarIr::UInt(operand as u64);
         let mut scalars = vec![place(self.instructions.len())];
-        for &(operation, left, right) in &self.instructions {
-            let right = match right {
+        for instruction in &self.instructions {
+            let right = match instruction.right {
                 Right::Operand(operand) => place(operand),
                 Right::Number(number) => ScalarIr::Float(number),
             };
-            scalars.extend([place(operation as usize), place(left), right]);
+            let arithmetic = place(instruction.arithmetic as usize);
+            scalars.extend([arithmetic, place(instruction.left), right]);
         }
         for output in &self.outputs {
             let (sum, operand) = match *output {
@@ -88,11 +97,11 @@ impl Elementwise {
                 ScalarIr::Float(number) => Right::Number(number),
                 ref operand => Right::Operand(place(operand)),
             };
-            (
-                [Add, Sub, Mul, Div][place(&code[0])],
-                place(&code[1]),
+            Instruction {
+                arithmetic: [Add, Sub, Mul, Div][place(&code[0])],
+                left: place(&code[1]),
                 right,
-            )
+            }
         };
         let output = |code: &[ScalarIr]| match code[0] {
             ScalarIr::Bool(true) => Output::Sum(place(&code[1])),
@@ -265,10 +274,11 @@ fn as_one(members: &[&Entrywise], used: impl Fn(TensorId) -> bool) -> CustomOpIr
     for member in members {
         let (result, operand) = (member.result, |k: usize| place[&member.operands[k].id]);
         let instruction = match member.action {
-            Action::Compute(arithmetic, number) => {
-                let right = number.map_or_else(|| Right::Operand(operand(1)), Right::Number);
-                (arithmetic, operand(0), right)
-            }
+            Action::Compute(arithmetic, number) => Instruction {
+                arithmetic,
+                left: operand(0),
+                right: number.map_or_else(|| Right::Operand(operand(1)), Right::Number),
+            },
             Action::End(make) => {
                 program.outputs.push(make(operand(0)));
                 outputs.push(result.clone());
@@ -346,6 +356,14 @@ pub(crate) mod tests {
         )
     }
 
+    fn instruction(arithmetic: Arithmetic, left: usize, right: Right) -> Instruction {
+        Instruction {
+            arithmetic,
+            left,
+            right,
+        }
+    }
+
     #[test]
     fn arithmetic_and_its_sum_become_one_operation() {
         // 2 = 0 - 1, 3 = 2 2, 4 = sum 3; of these only 2 and 4 are read.
@@ -361,8 +379,8 @@ pub(crate) mod tests {
         assert_eq!(
             program.instructions,
             [
-                (Arithmetic::Sub, 0, Right::Operand(1)),
-                (Arithmetic::Mul, 2, Right::Operand(2))
+                instruction(Arithmetic::Sub, 0, Right::Operand(1)),
+                instruction(Arithmetic::Mul, 2, Right::Operand(2))
             ]
         );
         assert_eq!(program.outputs, [Output::Values(2), Output::Sum(3)]);
@@ -411,13 +429,13 @@ pub(crate) mod tests {
     fn programs_survive_their_encoding() {
         let program = Elementwise {
             instructions: vec![
-                (Arithmetic::Add, 0, Right::Operand(1)),
-                (Arithmetic::Sub, 1, Right::Operand(0)),
-                (Arithmetic::Mul, 2, Right::Operand(3)),
-                (Arithmetic::Div, 3, Right::Operand(2)),
-                (Arithmetic::Add, 4, Right::Number(0.1)),
-                (Arithmetic::Mul, 5, Right::Number(-3.0)),
-                (Arithmetic::Div, 6, Right::Number(1e-300)),
+                instruction(Arithmetic::Add, 0, Right::Operand(1)),
+                instruction(Arithmetic::Sub, 1, Right::Operand(0)),
+                instruction(Arithmetic::Mul, 2, Right::Operand(3)),
+                instruction(Arithmetic::Div, 3, Right::Operand(2)),
+                instruction(Arithmetic::Add, 4, Right::Number(0.1)),
+                instruction(Arithmetic::Mul, 5, Right::Number(-3.0)),
+                instruction(Arithmetic::Div, 6, Right::Number(1e-300)),
             ],
             outputs: vec![Output::Sum(7), Output::Values(8)],
         };

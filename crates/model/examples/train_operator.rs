@@ -2,7 +2,7 @@
 
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
-use model::training::{Checkpoint, Progress, SphereData, Training};
+use model::training::{Checkpoint, SphereData, Training, TrainingProgress};
 use operators::ComputeDevice;
 use report::{Axis, Figure, LineChart, OutputDir, Series};
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         seed: 1,
         held_out: 4,
     };
-    let mut told = |at: &Progress, _: &Checkpoint<()>| {
+    let mut told = |at: &TrainingProgress, _: &Checkpoint<()>| {
         println!(
             "iteration {} of {}: loss {:.2e}",
             at.iteration, at.of, at.held_out_loss

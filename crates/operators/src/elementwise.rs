@@ -236,10 +236,15 @@ impl<T: Real> Machine<'_, T> {
 }
 
 fn compute<'a, T: Real>(
-    &(arithmetic, left, right): &Instruction,
+    instruction: &Instruction,
     result: &mut [T],
     operand: impl Fn(usize) -> &'a [T],
 ) {
+    let Instruction {
+        arithmetic,
+        left,
+        right,
+    } = *instruction;
     // Two loops for each operation, so that each is compiled to vector instructions.
     macro_rules! each {
         ($x:ident $op:tt $y:ident) => {
@@ -271,14 +276,22 @@ fn compute<'a, T: Real>(
 mod tests {
     use super::*;
 
+    fn instruction(arithmetic: Arithmetic, left: usize, right: Right) -> Instruction {
+        Instruction {
+            arithmetic,
+            left,
+            right,
+        }
+    }
+
     /// `(a + b s) / a` and its sum, and `b` in single precision.
     fn program() -> Elementwise {
         Elementwise {
             instructions: vec![
-                (Arithmetic::Mul, 1, Right::Operand(2)),
-                (Arithmetic::Add, 0, Right::Operand(3)),
-                (Arithmetic::Div, 4, Right::Operand(0)),
-                (Arithmetic::Mul, 5, Right::Number(2.0)),
+                instruction(Arithmetic::Mul, 1, Right::Operand(2)),
+                instruction(Arithmetic::Add, 0, Right::Operand(3)),
+                instruction(Arithmetic::Div, 4, Right::Operand(0)),
+                instruction(Arithmetic::Mul, 5, Right::Number(2.0)),
             ],
             outputs: vec![Output::Values(5), Output::Sum(6), Output::Values(1)],
         }

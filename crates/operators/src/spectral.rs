@@ -56,7 +56,7 @@ fn forward<const R: usize>(x: Tensor<R>, axes: usize) -> Complex<R> {
 }
 
 /// Real part of the normalized inverse transform.
-fn inverse<const R: usize>((re, im): Complex<R>, axes: usize) -> Tensor<R> {
+fn inverse<const R: usize>(re: Tensor<R>, im: Tensor<R>, axes: usize) -> Tensor<R> {
     let points: usize = re.dims()[R - axes..].iter().product();
     transform(re, Some(im), axes, true).0 / points as f64
 }
@@ -158,11 +158,8 @@ pub(crate) fn circular_convolution<const R: usize, const K: usize>(
     let (re, im) = forward(x, K);
     // Correlation multiplies by the conjugate of the kernel's spectrum, its adjoint by the spectrum.
     let kim = if adjoint { kim } else { kim.neg() };
-    let product = (
-        re.clone() * kre.clone() - im.clone() * kim.clone(),
-        re * kim + im * kre,
-    );
-    inverse(product, K)
+    let product = re.clone() * kre.clone() - im.clone() * kim.clone();
+    inverse(product, re * kim + im * kre, K)
 }
 
 /// See [`crate::Operation::Correlation`].
@@ -175,14 +172,12 @@ pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
     let grid: Vec<usize> = x.dims()[R - K..].to_vec();
     let (xre, xim) = forward(x, K);
     let (gre, gim) = forward(g, K);
-    let mut product = (
-        xre.clone() * gre.clone() + xim.clone() * gim.clone(),
-        xim * gre - xre * gim,
-    );
+    let mut re = xre.clone() * gre.clone() + xim.clone() * gim.clone();
+    let mut im = xim * gre - xre * gim;
     for axis in 0..R - K {
-        product = (product.0.sum_dim(axis), product.1.sum_dim(axis));
+        (re, im) = (re.sum_dim(axis), im.sum_dim(axis));
     }
-    let mut correlation = inverse(product, K);
+    let mut correlation = inverse(re, im, K);
     for (axis, &n) in grid.iter().enumerate() {
         correlation = correlation.select(R - K + axis, wrapped(width, n, &device));
     }
@@ -193,5 +188,5 @@ pub(crate) fn kernel_correlation<const R: usize, const K: usize>(
 pub(crate) fn spectral_filter<const R: usize>(x: Tensor<R>, symbol: Tensor<1>) -> Tensor<R> {
     let symbol = symbol.reshape(x.dims());
     let (re, im) = forward(x, R);
-    inverse((re * symbol.clone(), im * symbol), R)
+    inverse(re * symbol.clone(), im * symbol, R)
 }

@@ -8,13 +8,13 @@ use crate::error::{Error, Result};
 
 /// An intact PNG or SVG picture, which becomes a part of the page.
 #[derive(Clone, Debug)]
-pub struct Image {
+pub struct ImageElement {
     mime: &'static str,
     data: String,
     size: Option<[u32; 2]>,
 }
 
-impl Image {
+impl ImageElement {
     /// A picture from the bytes of a PNG or SVG file; `name` is for messages.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self> {
         let (mime, size) = if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
@@ -83,14 +83,14 @@ mod tests {
 
     #[test]
     fn pictures_are_recognised_with_their_size() {
-        let still = Image::from_bytes("still", &picture(7).to_png().unwrap()).unwrap();
+        let still = ImageElement::from_bytes("still", &picture(7).to_png().unwrap()).unwrap();
         assert_eq!(still.size, Some([3, 2]));
         let html = still.html("red \"squares\"").0;
         assert!(html.starts_with("<img src=\"data:image/png;base64,iVBOR"));
         assert!(html.ends_with("alt=\"red &quot;squares&quot;\" width=\"3\" height=\"2\">"));
 
         let svg = br#"<svg xmlns="http://www.w3.org/2000/svg" width="80" height="40.4"/>"#;
-        let svg = Image::from_bytes("drawing", svg).unwrap();
+        let svg = ImageElement::from_bytes("drawing", svg).unwrap();
         assert_eq!(svg.size, Some([80, 40]));
         assert_eq!(svg.mime, "image/svg+xml");
     }
@@ -111,7 +111,7 @@ mod tests {
             ("photo.png", b"\xff\xd8\xff\xe0"),
         ];
         for (name, bytes) in cases {
-            let error = Image::from_bytes(name, bytes).unwrap_err();
+            let error = ImageElement::from_bytes(name, bytes).unwrap_err();
             let message = error.to_string();
             assert!(matches!(error, Error::Picture { .. }));
             assert!(

@@ -1,7 +1,7 @@
 //! Pages to look at: figures, tables, picture sequences and surfaces to turn in one HTML file.
 //!
 //! ```
-//! use pages::{Facts, Image, Page, Section, Table, View, viewer};
+//! use pages::{Facts, ImageElement, Page, Section, TableElement, View, viewer};
 //! use geometry::{Grid, phase_field, shapes::Ball};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,9 +13,9 @@
 //!         .quality(render::Quality::Draft)
 //!         .render([160, 120])?;
 //!
-//!     let poster = Image::from_bytes("ball", &picture.to_png()?)?;
+//!     let poster = ImageElement::from_bytes("ball", &picture.to_png()?)?;
 //!     let ball = viewer("A ball", &poster, View::default(), [("step 0", &mesh)])?;
-//!     let table = Table::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
+//!     let table = TableElement::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
 //!     let parameters = Section::new("Parameters").with(Facts::default().with("eps", "2 h"));
 //!     let page = Page::new("Balls & spheres")
 //!         .with_lead("What a ball looks like.")
@@ -59,10 +59,10 @@ mod viewer;
 
 pub use error::{Error, Result};
 pub use facts::{Facts, five_digits};
-pub use image::Image;
+pub use image::ImageElement;
 pub use maud::Markup;
 pub use page::{Page, Section, figure, frames, thinned};
 pub use render::View;
-pub use table::Table;
+pub use table::TableElement;
 pub use text::{markdown, paragraph};
 pub use viewer::viewer;

@@ -9,7 +9,7 @@ use files::{Sha256, write_atomically};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use crate::error::Result;
-use crate::image::Image;
+use crate::image::ImageElement;
 
 const STYLE: &str = include_str!("../assets/page.css");
 const CONTROLS: &str = include_str!("../assets/controls.js");
@@ -192,7 +192,7 @@ impl Section {
         self
     }
 
-    /// Adds a block: a [paragraph](crate::paragraph), text in [Markdown](crate::markdown), a [`figure`], a [`Table`](crate::Table),
+    /// Adds a block: a [paragraph](crate::paragraph), text in [Markdown](crate::markdown), a [`figure`], a [`TableElement`](crate::TableElement),
     /// [`Facts`](crate::Facts), [`frames`], a [viewer](crate::viewer()) or another section.
     pub fn with(mut self, block: impl Render) -> Self {
         self.push(block);
@@ -212,14 +212,14 @@ impl Render for Section {
 }
 
 /// A picture with a caption, which also is what readers are told who cannot see the picture.
-pub fn figure(image: &Image, caption: &str) -> Markup {
+pub fn figure(image: &ImageElement, caption: &str) -> Markup {
     html! {
         figure { (image.html(caption)) figcaption { (caption) } }
     }
 }
 
 /// Pictures of which one is shown at a time, chosen by a slider or played: one or more with a label each, such as the step of a flow.
-pub fn frames(caption: &str, frames: &[(String, Image)]) -> Markup {
+pub fn frames(caption: &str, frames: &[(String, ImageElement)]) -> Markup {
     html! {
         figure.frames {
             div.strip tabindex="0" role="region" aria-label=(caption) {

@@ -14,9 +14,9 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::facts::{Facts, five_digits, natural};
-use crate::image::Image;
+use crate::image::ImageElement;
 use crate::page::{Page, Section, figure};
-use crate::table::Table;
+use crate::table::TableElement;
 use crate::text::{linked, markdown, paragraph};
 
 /// Longer tables are folded away.
@@ -111,9 +111,9 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
     for file in &files {
         let (stem, extension) = stem_and_extension(file);
         // Tables in Markdown, and those in CSV that are not there in Markdown.
-        let decode: fn(String, &str) -> Result<Table> = match extension {
-            "md" if file != "README.md" => Table::from_markdown,
-            "csv" if !files.contains(&format!("{stem}.md")) => Table::from_csv,
+        let decode: fn(String, &str) -> Result<TableElement> = match extension {
+            "md" if file != "README.md" => TableElement::from_markdown,
+            "csv" if !files.contains(&format!("{stem}.md")) => TableElement::from_csv,
             _ => continue,
         };
         let table = read(root, &path(file)).and_then(|text| decode(path(file), &text));
@@ -172,8 +172,8 @@ fn read(root: &Path, file: &str) -> Result<String> {
     Ok(String::from_utf8_lossy(&read_bytes(root, file)?).into_owned())
 }
 
-fn image(root: &Path, file: &str) -> Result<Image> {
-    Image::from_bytes(file, &read_bytes(root, file)?)
+fn image(root: &Path, file: &str) -> Result<ImageElement> {
+    ImageElement::from_bytes(file, &read_bytes(root, file)?)
 }
 
 /// The important facts of a manifest: program, machine, seed, times, parameters.

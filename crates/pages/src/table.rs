@@ -8,7 +8,7 @@ use crate::text::inline;
 
 /// A table of text, its columns of numbers aligned right.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Table {
+pub struct TableElement {
     pub(crate) caption: String,
     head: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -16,7 +16,7 @@ pub struct Table {
     marked: bool,
 }
 
-impl Table {
+impl TableElement {
     /// A table from its parts: a column or more, and rows of as many cells.
     pub fn new(
         caption: impl Into<String>,
@@ -116,7 +116,7 @@ impl Table {
     }
 }
 
-impl Render for Table {
+impl Render for TableElement {
     fn render(&self) -> Markup {
         let numeric: Vec<bool> = (0..self.head.len()).map(|k| self.is_numeric(k)).collect();
         // Wide tables scroll, also by keyboard.
@@ -189,13 +189,13 @@ mod tests {
     fn markdown_and_csv_give_the_same_table() {
         let markdown =
             "Intro.\n\n| method | \\|F\\| \\\\ |\n|:--|--:|\n| a | 1.5 |\n| b | – |\n\nEnd";
-        let table = Table::from_markdown("t", markdown).unwrap();
-        let csv = Table::from_csv("t", "method,|F| \\\na,1.5\nb,–\n").unwrap();
+        let table = TableElement::from_markdown("t", markdown).unwrap();
+        let csv = TableElement::from_csv("t", "method,|F| \\\na,1.5\nb,–\n").unwrap();
         assert_eq!(table.render().0, csv.render().0);
         assert_eq!(table.rows(), [["a", "1.5"], ["b", "–"]]);
         assert_eq!(csv.head(), ["method", "|F| \\"]);
         let linked = "| a |\n|---|\n| [b](c.png) `d` |\n";
-        let html = Table::from_markdown("t", linked).unwrap().render().0;
+        let html = TableElement::from_markdown("t", linked).unwrap().render().0;
         assert!(html.contains("<td>b <code>d</code></td>"), "{html}");
     }
 
@@ -207,7 +207,7 @@ mod tests {
         for cell in ["x", "1 2", "nan", "2·10x", "256x256", "·10⁻⁸"] {
             assert!(!is_number(cell), "{cell}");
         }
-        let table = Table::from_csv("t", "a,b,c\nx,1,z\ny,–,3\n").unwrap();
+        let table = TableElement::from_csv("t", "a,b,c\nx,1,z\ny,–,3\n").unwrap();
         let numeric: Vec<bool> = (0..3).map(|k| table.is_numeric(k)).collect();
         assert_eq!(numeric, [false, true, false]);
         let html = table.render().0;
@@ -221,18 +221,18 @@ mod tests {
 
     #[test]
     fn what_is_no_table_is_named() {
-        let message = |result: Result<Table>| result.unwrap_err().to_string();
-        let text = message(Table::from_markdown("notes.md", "no table | here"));
+        let message = |result: Result<TableElement>| result.unwrap_err().to_string();
+        let text = message(TableElement::from_markdown("notes.md", "no table | here"));
         assert!(
             text.contains("notes.md") && text.contains("|---|"),
             "{text}"
         );
-        let text = message(Table::from_csv("uneven.csv", "a,b\n1\n"));
+        let text = message(TableElement::from_csv("uneven.csv", "a,b\n1\n"));
         assert!(
             text.contains("uneven.csv") && text.contains("row 0") && text.contains("1 cells"),
             "{text}"
         );
-        let text = message(Table::from_csv("empty.csv", ""));
+        let text = message(TableElement::from_csv("empty.csv", ""));
         assert!(text.contains("empty.csv"), "{text}");
     }
 }

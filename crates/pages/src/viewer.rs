@@ -6,7 +6,7 @@ use render::View;
 use surfaces::TriangleMesh;
 
 use crate::error::Result;
-use crate::image::Image;
+use crate::image::ImageElement;
 use crate::surface::Surface;
 
 /// Surfaces, such as the steps of a flow, of which one is shown and can be turned: one or more with a label each, all seen in one scale
@@ -17,7 +17,7 @@ use crate::surface::Surface;
 /// those of the triangles around a vertex, weighted by area.
 pub fn viewer<'a>(
     caption: &str,
-    poster: &Image,
+    poster: &ImageElement,
     view: View,
     surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
 ) -> Result<Markup> {

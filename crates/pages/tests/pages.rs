@@ -3,7 +3,8 @@
 use geometry::shapes::Ball;
 use geometry::{Grid, UpAxis, phase_field};
 use pages::{
-    Error, Facts, Image, Page, Section, Table, View, figure, frames, markdown, paragraph, viewer,
+    Error, Facts, ImageElement, Page, Section, TableElement, View, figure, frames, markdown,
+    paragraph, viewer,
 };
 use surfaces::{TriangleMesh, phase_field_surface};
 
@@ -16,9 +17,9 @@ fn ball() -> TriangleMesh {
     phase_field_surface(&u, eps).unwrap()
 }
 
-fn picture() -> Image {
+fn picture() -> ImageElement {
     let picture = render::Picture::new([4, 3], vec![[1, 2, 3, 255]; 12]).unwrap();
-    Image::from_bytes("picture", &picture.to_png().unwrap()).unwrap()
+    ImageElement::from_bytes("picture", &picture.to_png().unwrap()).unwrap()
 }
 
 /// A page with every kind of block, all with the same text.
@@ -34,7 +35,7 @@ fn page(text: &str) -> Page {
         Section::new(text)
             .with(paragraph(text))
             .with(figure(&picture(), text))
-            .with(Table::new(text, [text, "b"], [[text, "2"]]).unwrap())
+            .with(TableElement::new(text, [text, "b"], [[text, "2"]]).unwrap())
             .with(frames(text, &pictures))
             .with(viewer(text, &picture(), View::default(), surfaces).unwrap())
             .with(inner),

@@ -4,7 +4,7 @@ use realfft::num_complex::Complex;
 
 use crate::flow::{Nodes, Rates};
 use crate::spectral::{Coefficients, collect};
-use crate::stepping::{Attempts, Method};
+use crate::stepping::{Attempts, Integrator};
 use crate::{Curve, Flow};
 
 /// Flows of plane curves, and of the profiles of surfaces that do not meet their axis. Two half steps are compared with one whole
@@ -15,7 +15,7 @@ pub(crate) struct Exponential {
     pub(crate) revolution: bool,
 }
 
-impl Method for Exponential {
+impl Integrator for Exponential {
     const ORDER: f64 = 5.0;
 
     fn attempts<'a>(&'a self, curve: &'a Curve) -> Attempts<'a> {

@@ -4,13 +4,13 @@
 use crate::dense::{Factors, jacobian};
 use crate::flow::{Nodes, Rates};
 use crate::spectral::{odd, sines};
-use crate::stepping::{Attempts, Method};
+use crate::stepping::{Attempts, Integrator};
 use crate::{Curve, Flow};
 
 /// Flows of the profiles of surfaces that meet their axis.
 pub(crate) struct Rosenbrock(pub(crate) Flow);
 
-impl Method for Rosenbrock {
+impl Integrator for Rosenbrock {
     const ORDER: f64 = 4.0;
 
     fn attempts<'a>(&'a self, curve: &'a Curve) -> Attempts<'a> {

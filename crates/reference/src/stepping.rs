@@ -6,9 +6,9 @@ use crate::{Curve, Error, Flow};
 /// Steps of different lengths from one curve: the curve at their end, and the root mean square of the error of its tangent angle.
 pub(crate) type Attempts<'a> = Box<dyn Fn(f64) -> (Curve, f64) + 'a>;
 
-/// A method for the flow of a curve in the time `tau` of the curve scaled to length `2 pi`, `dt = scale^m dtau`, `m` the order of
+/// An integrator of the flow of a curve in the time `tau` of the curve scaled to length `2 pi`, `dt = scale^m dtau`, `m` the order of
 /// the flow.
-pub(crate) trait Method {
+pub(crate) trait Integrator {
     /// Order of the error of one step.
     const ORDER: f64;
 
@@ -17,7 +17,7 @@ pub(crate) trait Method {
 
 /// The curve at increasing times.
 pub(crate) fn run(
-    method: &impl Method,
+    integrator: &impl Integrator,
     flow: Flow,
     tolerance: f64,
     start: Curve,
@@ -43,7 +43,7 @@ pub(crate) fn run(
         }
         while time - curve.time > SLACK * time {
             curve = advanced(
-                method,
+                integrator,
                 flow,
                 tolerance,
                 &curve.fitted(tolerance)?,
@@ -62,8 +62,8 @@ pub(crate) fn run(
 const SLACK: f64 = 1e-13;
 
 /// The curve after one step, which ends at the time at the latest.
-fn advanced<M: Method>(
-    method: &M,
+fn advanced<I: Integrator>(
+    integrator: &I,
     flow: Flow,
     tolerance: f64,
     curve: &Curve,
@@ -71,11 +71,11 @@ fn advanced<M: Method>(
     step: &mut f64,
 ) -> Result<Curve, Error> {
     let clock = curve.clock(flow);
-    let attempt = method.attempts(curve);
+    let attempt = integrator.attempts(curve);
     let mut length = step.min((time - curve.time) / clock);
     loop {
         let (end, error) = attempt(length);
-        let factor = (0.9 * (tolerance / error).powf(1.0 / M::ORDER)).clamp(0.1, 4.0);
+        let factor = (0.9 * (tolerance / error).powf(1.0 / I::ORDER)).clamp(0.1, 4.0);
         if error <= tolerance && end.time <= time * (1.0 + SLACK) {
             // A step that only had to meet the time says nothing about the next one.
             if length >= *step {

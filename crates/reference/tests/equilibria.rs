@@ -83,7 +83,7 @@ fn vesicles_solve_the_shape_equations_from_their_pole() {
         };
         let length = profile.length() / 4.0 - start;
         let begin = [start, pole * start, pole, slope * start];
-        let [r, psi, ..] = integrate(begin, (length, STEPS), equations);
+        let [r, psi, ..] = integrate(begin, length, STEPS, equations);
         let errors = [r - profile.point(PI / 2.0)[0], psi - PI / 2.0];
         assert!(
             errors.iter().all(|e| e.abs() < 1e-4),
@@ -121,7 +121,7 @@ fn elastic_curves_close_and_enclose_their_area() {
             ]
         };
         let begin = [0.0, 0.0, 0.0, curvature, 0.0, 0.0, 0.0];
-        let end = integrate(begin, (TAU, STEPS), equations);
+        let end = integrate(begin, TAU, STEPS, equations);
         let exact = [
             0.0,
             0.0,

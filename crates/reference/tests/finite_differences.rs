@@ -42,7 +42,7 @@ impl Polar {
         let r: Vec<f64> = (0..self.nodes).map(|i| start(self.angle(i))).collect();
         let smallest = r.iter().copied().fold(f64::INFINITY, f64::min);
         let steps = (time / (0.12 * (self.spacing() * smallest).powi(4))).ceil();
-        let r = integrate(r, (time, steps as usize), |r: &Vec<f64>| self.rates(r));
+        let r = integrate(r, time, steps as usize, |r: &Vec<f64>| self.rates(r));
         [0.0, PI / 2.0].map(|at| self.interpolated(&r, at))
     }
 

@@ -32,7 +32,8 @@ fn largest_difference<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
 /// Integrates `y' = f(y)` by steps of the classical Runge-Kutta method.
 fn integrate<Y: Clone + AsRef<[f64]> + AsMut<[f64]>>(
     mut y: Y,
-    (length, steps): (f64, usize),
+    length: f64,
+    steps: usize,
     f: impl Fn(&Y) -> Y,
 ) -> Y {
     let step = length / steps as f64;

@@ -138,8 +138,8 @@ impl Surface for PngSurface<'_> {
 }
 
 /// Draws a PNG file of the given size in layout units.
-pub(crate) fn png((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surface)) -> Vec<u8> {
-    let [width, height] = [width, height].map(|side| side as usize * PNG_SCALE);
+pub(crate) fn png(size: [u32; 2], draw: impl FnOnce(&mut dyn Surface)) -> Vec<u8> {
+    let [width, height] = size.map(|side| side as usize * PNG_SCALE);
     let fine = [width, height].map(|side| side * SUPERSAMPLING);
     let Rgb(page, ..) = Rgb::WHITE;
     let mut samples = vec![page; 3 * fine[0] * fine[1]];
@@ -190,7 +190,7 @@ mod tests {
                 ring(20.0, 1.0),
                 ring(36.0, 2.0),
             ];
-            let bytes = png((40, 40), |s| s.fill(&loops, BLACK));
+            let bytes = png([40; 2], |s| s.fill(&loops, BLACK));
             let picture = image::load_from_memory(&bytes).unwrap().into_rgb8();
             let area = 20 * 20 - 10 * 10 + 2 * 2 + 4 * 4;
             let black = picture.pixels().filter(|pixel| pixel.0 == [0; 3]);
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn hairlines_are_sharp_and_wide_curves_without_holes() {
         let cross = [[5.0, 5.0], [35.0, 35.0], [35.0, 5.0], [5.0, 35.0]].map(DVec2::from);
-        let bytes = png((40, 40), |s| {
+        let bytes = png([40; 2], |s| {
             s.stroke(&[dvec2(5.0, 2.5), dvec2(35.0, 2.5)], 1.0, BLACK);
             s.stroke(&cross, 6.0, BLACK);
         });

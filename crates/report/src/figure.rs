@@ -154,7 +154,7 @@ impl Figure {
         let room = width - PADDING - left - COLUMN_GAP * (columns - 1) as f64;
         let cell = |panel| Cell::new(panel, fonts, room / columns as f64, !self.shared_legend);
         let mut cells = self.panels.iter().map(cell).collect::<Result<Vec<_>>>()?;
-        let legend_top = arrange(&mut cells, columns, room, (left, top)) + AIR;
+        let legend_top = arrange(&mut cells, columns, room, dvec2(left, top)) + AIR;
         let shared = self.shared_legend.then(|| joined(&cells));
         let legend = Block::new(shared.as_deref().unwrap_or_default(), fonts.tick, inner);
         let note_top = legend_top + legend.height;
@@ -165,7 +165,7 @@ impl Figure {
         }
         cells.iter_mut().for_each(Cell::fit);
         Ok(Layout {
-            size: (width as u32, height as u32),
+            size: [width, height].map(|side| side as u32),
             fonts,
             cells,
             legend,
@@ -231,7 +231,7 @@ fn draw_lines(surface: &mut dyn Surface, text: &str, style: TextStyle, top: DVec
 
 /// Where everything is.
 struct Layout<'a> {
-    size: (u32, u32),
+    size: [u32; 2],
     fonts: Fonts,
     cells: Vec<Cell<'a>>,
     legend: Block,
@@ -331,8 +331,8 @@ impl<'a> Cell<'a> {
     }
 }
 
-/// Gives all cells their places, with plot boxes of one width and of one height in a row, and says where they end.
-fn arrange(cells: &mut [Cell<'_>], columns: usize, room: f64, (left, top): (f64, f64)) -> f64 {
+/// Gives all cells their places from a corner on, with plot boxes of one width and of one height in a row, and says where they end.
+fn arrange(cells: &mut [Cell<'_>], columns: usize, room: f64, corner: DVec2) -> f64 {
     let mut sides = vec![Margins::default(); columns];
     let mut rows = vec![Margins::default(); cells.len().div_ceil(columns)];
     // Margins depend on the tick labels, those on the sizes, and those on the margins.
@@ -354,9 +354,9 @@ fn arrange(cells: &mut [Cell<'_>], columns: usize, room: f64, (left, top): (f64,
             }
         }
     }
-    let mut y = top;
+    let mut y = corner.y;
     for (row, ends) in cells.chunks_mut(columns).zip(&rows) {
-        let mut x = left;
+        let mut x = corner.x;
         let height = row[0].plot.height;
         for (cell, side) in row.iter_mut().zip(&sides) {
             (cell.plot.x, cell.plot.y) = (x + side.left, y + ends.top);
@@ -447,7 +447,7 @@ mod tests {
     fn a_curve_is_where_its_points_are() {
         let figure = Figure::from(diagonal());
         let (picture, size) = (picture(&figure), figure.layout().unwrap().size);
-        assert_eq!(picture.dimensions(), (2 * size.0, 2 * size.1));
+        assert_eq!(picture.dimensions(), (2 * size[0], 2 * size[1]));
         assert_eq!(at(&picture, [0.0; 2]), Rgb::WHITE);
         for t in [0.1, 0.25, 0.5, 0.75, 0.9] {
             let [on, beside] = [t, 1.0 - t + 0.15].map(|y| place(&figure, [t, y]));
@@ -532,7 +532,7 @@ mod tests {
             );
         }
         let figure = Figure::from(diagonal()).with_width(700.0);
-        assert_eq!(figure.layout().unwrap().size.0, 700);
+        assert_eq!(figure.layout().unwrap().size[0], 700);
     }
 
     #[test]
@@ -710,7 +710,7 @@ mod tests {
         assert_eq!((plots[0].y, plots[0].height), (plots[1].y, plots[1].height));
         assert_eq!((plots[0].x, plots[0].width), (plots[2].x, plots[2].width));
         assert!(plots[1].x > plots[0].right() && plots[2].y > plots[0].bottom());
-        let (width, height) = layout.size;
+        let [width, height] = layout.size;
         assert!(plots[1].right() <= f64::from(width) && plots[2].bottom() < f64::from(height));
     }
 

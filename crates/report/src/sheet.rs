@@ -16,7 +16,7 @@ pub type Numbers = BTreeMap<&'static str, f64>;
 /// let sheet = Sheet::of(&circles)
 ///     .keyed(|(radius, _), name| format!("circle{radius}.{name}"))
 ///     .text("circle", |(radius, _)| format!("R = {radius}"))
-///     .measure("newton", ("iterations", Shortest), |&(_, count)| count);
+///     .measure("newton", "iterations", Shortest, |&(_, count)| count);
 /// let (table, metrics) = sheet.finish()?;
 /// assert_eq!(table.to_csv(), "circle,iterations\nR = 1,2\nR = 2,3\n");
 /// assert_eq!(metrics[1], ("circle2.newton".to_owned(), 3_usize.into()));
@@ -95,7 +95,8 @@ impl<'a, R> Sheet<'a, R> {
     pub fn measure<C: Into<Cell>>(
         self,
         name: &str,
-        (head, format): (&str, Format),
+        head: &str,
+        format: Format,
         value: impl Fn(&'a R) -> C,
     ) -> Self {
         let mut sheet = self.column(head, format, value);

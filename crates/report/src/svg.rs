@@ -129,7 +129,8 @@ impl Surface for SvgSurface {
 }
 
 /// Draws an SVG document of the given size in layout units.
-pub(crate) fn svg((width, height): (u32, u32), draw: impl FnOnce(&mut dyn Surface)) -> String {
+pub(crate) fn svg(size: [u32; 2], draw: impl FnOnce(&mut dyn Surface)) -> String {
+    let [width, height] = size;
     let mut surface = SvgSurface::default();
     draw(&mut surface);
     let elements = [surface.images, surface.shapes].concat().concat();
@@ -152,7 +153,7 @@ mod tests {
     #[test]
     fn loops_are_one_path_and_dashes_an_attribute() {
         let ring = |side| Rect::new(5.0, 5.0, side, side).corners().to_vec();
-        let document = svg((100, 50), |s| {
+        let document = svg([100, 50], |s| {
             s.fill(&[ring(20.0), vec![], ring(10.0)], BLACK);
             s.dashed(&[dvec2(0.0, 1.0), dvec2(9.0, 1.0)], 2.0, BLACK, &[8.5, 4.5]);
         });
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn images_take_their_place_and_scale_below_everything_else() {
         let cells = [Rgb(1, 2, 3), Rgb(4, 5, 6)];
-        let document = svg((100, 50), |s| {
+        let document = svg([100, 50], |s| {
             s.markers(Marker::Circle, &[dvec2(1.0, 2.0)], BLACK);
             s.image(Rect::new(10.0, 5.0, 20.0, 30.0), 2, &cells, false);
         });

@@ -24,7 +24,7 @@ const DEEPEST: usize = 200;
 /// without an interruption.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct State<'a> {
+pub struct CheckpointState<'a> {
     /// Number of steps done.
     pub step: u64,
     /// Anything but large arrays, nested by at most 200 levels. JSON has no NaN and no infinity: what may become either belongs in an array.
@@ -63,7 +63,7 @@ impl<'de> Deserialize<'de> for Array<'_> {
     }
 }
 
-impl<'a> State<'a> {
+impl<'a> CheckpointState<'a> {
     /// A state without arrays.
     pub fn new(step: u64, notes: Value) -> Self {
         Self {
@@ -116,20 +116,27 @@ pub(crate) fn kept(finished: bool) -> usize {
     if finished { 1 } else { 2 }
 }
 
-/// Whether a run is finished, its files, and its state. The format of a checkpoint is
+/// What a checkpoint says of a run. Its format is
 ///
 /// | bytes | content |
 /// |---|---|
 /// | 8 | magic `8f 63 6b 70 74 0d 0a 1a` |
 /// | 4 | format version, little endian: 5 |
-/// | … | these three as CBOR (RFC 8949) |
+/// | … | the array of these three as CBOR (RFC 8949) |
 /// | 32 | SHA-256 of all bytes before |
-pub(crate) type Commit<'a> = (bool, Files, State<'a>);
+pub(crate) struct Commit {
+    /// Whether the run is finished.
+    pub(crate) finished: bool,
+    pub(crate) files: Files,
+    pub(crate) state: CheckpointState<'static>,
+}
 
 /// Writes a checkpoint.
 pub(crate) fn write(
     out: &mut dyn Write,
-    (finished, files, state): (bool, &Files, &State<'_>),
+    finished: bool,
+    files: &Files,
+    state: &CheckpointState<'_>,
 ) -> io::Result<()> {
     let mut hashed = Hashed(out, Sha256::default());
     hashed.write_all(&MAGIC)?;
@@ -178,7 +185,7 @@ pub(crate) fn content(folder: &Path, step: u64) -> Result<(Vec<u8>, PathBuf), Er
 }
 
 /// Reads the checkpoint of a step.
-pub(crate) fn read(folder: &Path, step: u64) -> Result<Commit<'static>, Error> {
+pub(crate) fn read(folder: &Path, step: u64) -> Result<Commit, Error> {
     let (bytes, path) = content(folder, step)?;
     let damaged = |what: String| Error::damaged(&path, what);
     let mut rest = match bytes.strip_prefix(&MAGIC).map(<[u8]>::split_first_chunk) {
@@ -186,20 +193,25 @@ pub(crate) fn read(folder: &Path, step: u64) -> Result<Commit<'static>, Error> {
         Some(Some((format, _))) => return Err(other_version(path, u32::from_le_bytes(*format))),
         _ => return Err(damaged("it does not begin as a checkpoint does".into())),
     };
-    let commit: Commit<'_> = ciborium::from_reader(&mut rest).map_err(|error| {
+    let read = ciborium::from_reader(&mut rest);
+    let (finished, files, state): (bool, Files, CheckpointState<'_>) = read.map_err(|error| {
         // It may quote anything.
         let quoted = files::shortened(&error.to_string(), 300);
         damaged(format!("its content is not as expected: {quoted}"))
     })?;
-    if commit.2.step != step || !rest.is_empty() {
-        let (found, more) = (commit.2.step, rest.len());
+    if state.step != step || !rest.is_empty() {
+        let (found, more) = (state.step, rest.len());
         return Err(damaged(format!(
             "it is of step {found}, or has {more} bytes too many"
         )));
     }
-    if let Some(name) = commit.1.keys().find(|name| names::check(name).is_err()) {
+    if let Some(name) = files.keys().find(|name| names::check(name).is_err()) {
         let shown = files::shortened(name, 60);
         return Err(damaged(format!("it lists a file with the name {shown:?}")));
     }
-    Ok(commit)
+    Ok(Commit {
+        finished,
+        files,
+        state,
+    })
 }

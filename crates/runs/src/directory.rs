@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use files::{Disk, Storage, make_folders_on};
+use files::{Disk, FileSystem, make_folders_on};
 
-use crate::checkpoint::{self, Files, State};
+use crate::checkpoint::{self, CheckpointState, Files};
 use crate::digest::{self, Seal};
 use crate::folder;
 use crate::lock::Lock;
@@ -19,7 +19,7 @@ use crate::{Error, lock, names};
 #[derive(Debug)]
 pub struct RunDirectory {
     pub(crate) path: PathBuf,
-    pub(crate) storage: Arc<dyn Storage>,
+    pub(crate) file_system: Arc<dyn FileSystem>,
     pub(crate) files: Files,
     /// Of the checkpoints that are part of the run, the newest first.
     pub(crate) steps: Vec<u64>,
@@ -35,17 +35,17 @@ impl RunDirectory {
     pub fn create(
         path: impl Into<PathBuf>,
         files: &[(&str, &[u8])],
-        state: &State<'_>,
+        state: &CheckpointState<'_>,
     ) -> Result<Self, Error> {
         Self::create_on(Arc::new(Disk), path, files, state)
     }
 
-    /// [`RunDirectory::create`] on another storage than the disk itself.
+    /// [`RunDirectory::create`] on another file system than the disk itself.
     pub fn create_on(
-        storage: Arc<dyn Storage>,
+        file_system: Arc<dyn FileSystem>,
         path: impl Into<PathBuf>,
         files: &[(&str, &[u8])],
-        state: &State<'_>,
+        state: &CheckpointState<'_>,
     ) -> Result<Self, Error> {
         let path = path.into();
         state.check()?;
@@ -54,20 +54,20 @@ impl RunDirectory {
             names::check(name)?;
             own.insert(name.into(), None);
         }
-        make_folders_on(&*storage, &path)?;
+        make_folders_on(&*file_system, &path)?;
         check_free(&path, &own)?;
-        let lock = lock::lock(&*storage, &path)?;
+        let lock = lock::lock(&*file_system, &path)?;
         // Again, now that nobody else starts a run here.
         check_free(&path, &own)?;
         for (left, _) in folder::list(&path)? {
             if !left.ends_with(names::LOCK) {
-                (storage.remove(&left)).map_err(files::Error::of("remove", left))?;
+                (file_system.remove(&left)).map_err(files::Error::of("remove", left))?;
             }
         }
-        make_folders_on(&*storage, path.join(names::CHECKPOINTS))?;
+        make_folders_on(&*file_system, path.join(names::CHECKPOINTS))?;
         let mut run = Self {
             path,
-            storage,
+            file_system,
             files: Files::new(),
             steps: Vec::new(),
             _lock: lock,
@@ -100,8 +100,8 @@ impl RunDirectory {
         self.check_open(name)?;
         let path = self.path.join(name);
         let (file, folder) = (digest::open(&path)?, path.parent().unwrap_or(&self.path));
-        (self.storage.sync_file(&file, &path))
-            .and_then(|()| self.storage.sync_folder(folder))
+        (self.file_system.sync_file(&file, &path))
+            .and_then(|()| self.file_system.sync_folder(folder))
             .map_err(files::Error::of("flush to disk", &path))?;
         self.files.insert(name.into(), Some(Seal::of(&path)?));
         Ok(())
@@ -125,7 +125,7 @@ impl RunDirectory {
     pub(crate) fn remove(&self, which: impl Fn(&Path) -> bool) -> Result<(), Error> {
         let others = folder::others(&self.path, &self.files, &self.steps)?;
         for path in others.into_iter().filter(|path| which(path)) {
-            (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+            (self.file_system.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
         Ok(())
     }
@@ -136,27 +136,27 @@ impl RunDirectory {
     /// The same state may be committed again, for example on an interruption right after a commit.
     /// After [`Error::Io`] the directory is that of this commit or of the last one, and the run may go
     /// on or be opened again.
-    pub fn commit(&mut self, state: &State<'_>) -> Result<(), Error> {
+    pub fn commit(&mut self, state: &CheckpointState<'_>) -> Result<(), Error> {
         self.commit_as(state, false)
     }
 
     /// Commits the last state, marks the run as finished, and keeps this checkpoint alone.
-    pub fn finish(mut self, state: &State<'_>) -> Result<(), Error> {
+    pub fn finish(mut self, state: &CheckpointState<'_>) -> Result<(), Error> {
         // Those in folders that were no part of the run when it was resumed.
         self.remove(folder::is_temporary)?;
         self.commit_as(state, true)
     }
 
-    fn commit_as(&mut self, state: &State<'_>, finished: bool) -> Result<(), Error> {
+    fn commit_as(&mut self, state: &CheckpointState<'_>, finished: bool) -> Result<(), Error> {
         state.check()?;
         let (last, step) = (self.steps.first().copied(), state.step);
-        let repeats = || checkpoint::read(&self.path, step).map(|(.., old)| old == *state);
+        let repeats = || checkpoint::read(&self.path, step).map(|old| old.state == *state);
         if last > Some(step) || last == Some(step) && !repeats()? {
             return Err(state.refused("a commit is of a later step than the last, or repeats it"));
         }
         let path = self.path.join(names::checkpoint(step));
-        files::write_atomically_on(&*self.storage, path, |out| {
-            checkpoint::write(out, (finished, &self.files, state))
+        files::write_atomically_on(&*self.file_system, path, |out| {
+            checkpoint::write(out, finished, &self.files, state)
         })?;
         if last != Some(step) {
             self.steps.insert(0, step);
@@ -165,7 +165,7 @@ impl RunDirectory {
         let kept = checkpoint::kept(finished).min(self.steps.len());
         for old in self.steps.drain(kept..) {
             let path = self.path.join(names::checkpoint(old));
-            (self.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+            (self.file_system.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
         Ok(())
     }
@@ -182,8 +182,9 @@ impl RunDirectory {
 
     fn store(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         let path = self.path.join(name);
-        make_folders_on(&*self.storage, path.parent().unwrap_or(&self.path))?;
-        let written = files::write_atomically_on(&*self.storage, path, |out| out.write_all(bytes));
+        make_folders_on(&*self.file_system, path.parent().unwrap_or(&self.path))?;
+        let written =
+            files::write_atomically_on(&*self.file_system, path, |out| out.write_all(bytes));
         Ok(written?)
     }
 }

@@ -2,13 +2,13 @@
 //! ends with the same bytes as if nothing had happened.
 //!
 //! ```
-//! use runs::{Error, RunDirectory, State};
+//! use runs::{CheckpointState, Error, RunDirectory};
 //! use serde_json::Value;
 //!
 //! fn compute(folder: &std::path::Path, last: u64) -> Result<(), Error> {
 //!     let (mut run, mut state) = match RunDirectory::open(folder) {
 //!         Err(Error::NoRun { .. }) => {
-//!             let start = State::new(0, Value::Null).with_array("u", vec![0.1, 0.2]);
+//!             let start = CheckpointState::new(0, Value::Null).with_array("u", vec![0.1, 0.2]);
 //!             let config = [("config.toml", &b"rate = 3.9\n"[..])];
 //!             (RunDirectory::create(folder, &config, &start)?, start)
 //!         }
@@ -48,7 +48,7 @@
 //! - A checkpoint is the commit. Other files are written and flushed before it, so that it describes
 //!   a whole state of the run whenever the process dies. What it does not list was written after it,
 //!   and the computation of a resumed run writes it again.
-//! - A run that is a function of its [`State`] ends with the same bytes in every file that is written once, however
+//! - A run that is a function of its [`CheckpointState`] ends with the same bytes in every file that is written once, however
 //!   often it was stopped: only the last checkpoint stays.
 //! - A bit that has flipped in one of those files is noticed when the run is opened, and the file named.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
@@ -70,7 +70,7 @@ mod lock;
 mod names;
 mod stored;
 
-pub use checkpoint::{Array, State};
+pub use checkpoint::{Array, CheckpointState};
 pub use directory::RunDirectory;
 pub use error::Error;
 pub use interrupt::Interrupt;

@@ -4,7 +4,7 @@ use std::fs::{File, TryLockError};
 use std::io::ErrorKind::AlreadyExists;
 use std::path::Path;
 
-use files::Storage;
+use files::FileSystem;
 
 use crate::{Error, digest, names};
 
@@ -21,7 +21,7 @@ impl Drop for Lock {
     }
 }
 
-pub(crate) fn lock(storage: &dyn Storage, folder: &Path) -> Result<Lock, Error> {
+pub(crate) fn lock(file_system: &dyn FileSystem, folder: &Path) -> Result<Lock, Error> {
     let path = folder.join(names::LOCK);
     let locked = || Error::Locked(folder.into());
     let file = if path.symlink_metadata().is_ok() {
@@ -30,7 +30,7 @@ pub(crate) fn lock(storage: &dyn Storage, folder: &Path) -> Result<Lock, Error> 
         let writable = File::options().read(true).write(true).open(&path);
         writable.unwrap_or(ordinary)
     } else {
-        match storage.create_file(&path) {
+        match file_system.create_file(&path) {
             // Somebody else was faster.
             Err(e) if e.kind() == AlreadyExists => return Err(locked()),
             made => made.map_err(files::Error::of("create", &path))?,

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use files::{Disk, Storage};
+use files::{Disk, FileSystem};
 
-use crate::checkpoint::{self, Commit, State};
+use crate::checkpoint::{self, CheckpointState, Commit};
 use crate::digest::{self, Seal};
 use crate::{Error, RunDirectory, folder, lock, names};
 
@@ -13,7 +13,7 @@ use crate::{Error, RunDirectory, folder, lock, names};
 #[derive(Debug)]
 pub struct StoredRun {
     run: RunDirectory,
-    state: State<'static>,
+    state: CheckpointState<'static>,
     finished: bool,
     leftovers: Vec<PathBuf>,
 }
@@ -38,33 +38,37 @@ impl RunDirectory {
 }
 
 impl StoredRun {
-    /// [`RunDirectory::open`], or [`RunDirectory::recover`], on another storage than the disk itself.
+    /// [`RunDirectory::open`], or [`RunDirectory::recover`], on another file system than the disk itself.
     pub fn find_on(
-        storage: Arc<dyn Storage>,
+        file_system: Arc<dyn FileSystem>,
         path: impl Into<PathBuf>,
         recover: bool,
     ) -> Result<Self, Error> {
         let path = path.into();
         // Before there is a lock file in somebody's folder.
         commits(&path)?;
-        let lock = lock::lock(&*storage, &path)?;
+        let lock = lock::lock(&*file_system, &path)?;
         let mut steps = commits(&path)?;
         let mut checked = check(&path, &mut steps);
         if let Err(Error::Damaged { fallback, .. }) = &mut checked {
             let intact = steps.iter().find_map(|&step| intact(&path, step).ok());
-            *fallback = intact.as_ref().map(|(.., state)| state.step);
+            *fallback = intact.as_ref().map(|commit| commit.state.step);
             if let Some(intact) = intact.filter(|_| recover) {
-                steps = vec![intact.2.step];
+                steps = vec![intact.state.step];
                 checked = Ok(intact);
             }
         }
-        let (finished, files, state) = checked?;
+        let Commit {
+            finished,
+            files,
+            state,
+        } = checked?;
         Ok(Self {
             leftovers: folder::others(&path, &files, &steps)?,
             finished,
             run: RunDirectory {
                 path,
-                storage,
+                file_system,
                 files,
                 steps,
                 _lock: lock,
@@ -79,7 +83,7 @@ impl StoredRun {
     }
 
     /// The state of the commit.
-    pub fn state(&self) -> &State<'static> {
+    pub fn state(&self) -> &CheckpointState<'static> {
         &self.state
     }
 
@@ -118,14 +122,14 @@ impl StoredRun {
         let checkpoints = self.run.path.join(names::CHECKPOINTS);
         let is_commit = |path: &Path| names::step(&folder::name(&self.run.path, path)).is_some();
         self.run.remove(is_commit)?;
-        let flushed = self.run.storage.sync_folder(&checkpoints);
+        let flushed = self.run.file_system.sync_folder(&checkpoints);
         flushed.map_err(files::Error::of("flush", checkpoints))?;
         self.run.remove(folder::is_temporary)
     }
 
     /// Goes on with the run, also with a finished one. [Leftovers](StoredRun::leftovers) stay until files of the same names are written, but
     /// for those that are [tidied](StoredRun::tidy) away.
-    pub fn resume(self) -> Result<(RunDirectory, State<'static>), Error> {
+    pub fn resume(self) -> Result<(RunDirectory, CheckpointState<'static>), Error> {
         self.tidy()?;
         Ok((self.run, self.state))
     }
@@ -134,7 +138,7 @@ impl StoredRun {
     /// run any more; they stay until [`RunDirectory::remove_others`].
     pub fn reopen(
         self,
-        state: &State<'_>,
+        state: &CheckpointState<'_>,
         ends: impl Fn(&str) -> bool,
     ) -> Result<RunDirectory, Error> {
         let (mut run, _) = self.resume()?;
@@ -145,7 +149,7 @@ impl StoredRun {
         others.retain(|&step| step != state.step);
         for other in others {
             let path = run.path.join(names::checkpoint(other));
-            (run.storage.remove(&path)).map_err(files::Error::of("remove", path))?;
+            (run.file_system.remove(&path)).map_err(files::Error::of("remove", path))?;
         }
         Ok(run)
     }
@@ -166,9 +170,9 @@ fn commits(folder: &Path) -> Result<Vec<u64>, Error> {
 }
 
 /// Checks everything. Of the steps, those are left whose checkpoints are part of the run.
-fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<Commit<'static>, Error> {
+fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<Commit, Error> {
     let newest = intact(folder, steps[0])?;
-    let kept = checkpoint::kept(newest.0);
+    let kept = checkpoint::kept(newest.finished);
     for &older in steps[1..].iter().take(kept - 1) {
         checkpoint::content(folder, older)?;
     }
@@ -177,9 +181,9 @@ fn check(folder: &Path, steps: &mut Vec<u64>) -> Result<Commit<'static>, Error> 
 }
 
 /// A checkpoint all of whose files are as they were written.
-fn intact(folder: &Path, step: u64) -> Result<Commit<'static>, Error> {
+fn intact(folder: &Path, step: u64) -> Result<Commit, Error> {
     let commit = checkpoint::read(folder, step)?;
-    for (name, seal) in &commit.1 {
+    for (name, seal) in &commit.files {
         let path = folder.join(name);
         if let Some(seal) = seal
             && Seal::of(&path)? != *seal

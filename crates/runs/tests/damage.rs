@@ -5,13 +5,13 @@ use std::io;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use files::{Disk, Storage};
+use files::{Disk, FileSystem};
 
 use crate::toy::{
     self, FILES, STEPS, contents, quick_folder, run_to, uninterrupted, write_contents,
 };
 use files::Sha256;
-use runs::{Error, RunDirectory, State};
+use runs::{CheckpointState, Error, RunDirectory};
 use serde_json::json;
 
 /// A checkpoint with other content and the checksum that goes with it.
@@ -278,7 +278,7 @@ fn a_finished_run_can_be_extended() {
 #[derive(Debug, Default)]
 struct Copying(Mutex<Vec<File>>);
 
-impl Storage for Copying {
+impl FileSystem for Copying {
     fn create_file(&self, path: &Path) -> io::Result<File> {
         let file = Disk.create_file(path)?;
         self.0.lock().unwrap().push(file.try_clone()?);
@@ -358,12 +358,13 @@ fn misuse_is_refused_and_changes_nothing() {
     let folder = quick_folder();
     let path = folder.path().join("run");
     let deep = (0..250).fold(json!(0), |inner, _| json!([inner]));
-    let refused = RunDirectory::create(&path, &[], &State::new(0, deep.clone()));
+    let refused = RunDirectory::create(&path, &[], &CheckpointState::new(0, deep.clone()));
     assert!(refused.unwrap_err().to_string().contains("deeply"));
     let refused = RunDirectory::create(&path, &[("../a", b"")], &toy::state_at(0));
     assert!(matches!(refused, Err(Error::Invalid(_))));
     assert!(!path.exists());
-    let mut run = RunDirectory::create(&path, &FILES, &State::new(0, json!(null))).unwrap();
+    let mut run =
+        RunDirectory::create(&path, &FILES, &CheckpointState::new(0, json!(null))).unwrap();
     for name in [
         "", "/a", "a/", "../a", "a/../b", ".hidden", "a b", "a\\b", "ü",
     ] {
@@ -381,18 +382,19 @@ fn misuse_is_refused_and_changes_nothing() {
     assert!(matches!(run.write_file("a/b", b""), Err(Error::Invalid(_))));
     assert!(run.replace_file("a/b", b"").is_err());
 
-    let unusable = |state: &State, run: &mut RunDirectory, reason: &str| {
+    let unusable = |state: &CheckpointState, run: &mut RunDirectory, reason: &str| {
         let message = run.commit(state).unwrap_err().to_string();
         assert!(message.contains(reason), "{message}");
     };
-    unusable(&State::new(1, deep), &mut run, "deeply");
+    unusable(&CheckpointState::new(1, deep), &mut run, "deeply");
     // Two hundred levels are read back.
     let nested = (0..200).fold(json!(0), |inner, _| json!([inner]));
-    run.commit(&State::new(1, nested.clone())).unwrap();
+    run.commit(&CheckpointState::new(1, nested.clone()))
+        .unwrap();
     drop(run);
     let (mut run, kept) = RunDirectory::open(&path).unwrap().resume().unwrap();
     assert_eq!(kept.notes, nested);
-    let state = |step| State::new(step, json!(0.1 + 0.2));
+    let state = |step| CheckpointState::new(step, json!(0.1 + 0.2));
     // Bits, not numbers.
     let odd = vec![f64::NAN, -0.0, f64::NEG_INFINITY, f64::from_bits(1)];
     let fourth = state(4).with_array("odd", odd.clone());
@@ -401,7 +403,7 @@ fn misuse_is_refused_and_changes_nothing() {
     unusable(&state(4), &mut run, "step 4");
     let other = state(4).with_array("odd", vec![0.0; 4]);
     unusable(&other, &mut run, "step 4");
-    unusable(&State::new(4, json!(0)), &mut run, "step 4");
+    unusable(&CheckpointState::new(4, json!(0)), &mut run, "step 4");
     unusable(&state(3), &mut run, "step 3");
     run.commit(&state(5).with_array("odd", odd.clone()))
         .unwrap();

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use crate::toy::{
     self, FILES, Quick, STEPS, Toy, contents, run_to, state_at, uninterrupted, write_contents,
 };
-use files::{Disk, Storage};
+use files::{Disk, FileSystem};
 use runs::{Error, RunDirectory, StoredRun};
 
 /// Fails at operation `at`, and also at all later ones if the process is to count as dead.
@@ -47,7 +47,7 @@ impl Faulty {
     }
 }
 
-impl Storage for Faulty {
+impl FileSystem for Faulty {
     fn create_folder(&self, path: &Path) -> io::Result<()> {
         self.next()?;
         Disk.create_folder(path)
@@ -86,16 +86,16 @@ impl Storage for Faulty {
 /// a fault.
 fn survives(
     folder: &Path,
-    storage: &Arc<Faulty>,
+    file_system: &Arc<Faulty>,
     expected: &BTreeMap<String, Vec<u8>>,
     damaged: bool,
 ) -> bool {
     let toy = Toy {
         recover: damaged,
-        ..Toy::on(storage.clone())
+        ..Toy::on(file_system.clone())
     };
     let result = toy::run(folder, &toy);
-    let fault = storage.operations() > storage.at;
+    let fault = file_system.operations() > file_system.at;
     assert_eq!(result.is_err(), fault, "{result:?}");
     if let Err(error) = &result {
         let message = error.to_string();
@@ -172,8 +172,8 @@ fn operations_of_a_resumption_fail(kills: impl Iterator<Item = usize>, least: us
         for at in 0..30 {
             let run = folder.path().join(format!("{at}"));
             write_contents(&run, &left);
-            let storage = Faulty::new(at, at % 2 == 0, 700);
-            assert!(survives(&run, &storage, &expected, false));
+            let file_system = Faulty::new(at, at % 2 == 0, 700);
+            assert!(survives(&run, &file_system, &expected, false));
         }
     }
     assert!(leftovers >= least, "only {leftovers} leftovers");
@@ -214,10 +214,10 @@ fn every_operation_of_a_recovery_may_fail() {
 fn after_a_failed_commit_the_run_goes_on_or_is_opened_again() {
     let folder = toy::quick_folder();
     let start = |name: &str, at| {
-        let storage = Faulty::new(at, false, usize::MAX);
+        let file_system = Faulty::new(at, false, usize::MAX);
         let path = folder.path().join(name);
-        let run = RunDirectory::create_on(storage.clone(), &path, &FILES, &state_at(0));
-        (run.unwrap(), path, storage.operations())
+        let run = RunDirectory::create_on(file_system.clone(), &path, &FILES, &state_at(0));
+        (run.unwrap(), path, file_system.operations())
     };
     let (_, _, operations) = start("counted", usize::MAX);
 
@@ -278,7 +278,7 @@ impl Watching {
     }
 }
 
-impl Storage for Watching {
+impl FileSystem for Watching {
     fn create_folder(&self, path: &Path) -> io::Result<()> {
         self.named(path);
         Disk.create_folder(path)
@@ -336,16 +336,16 @@ impl Storage for Watching {
 #[test]
 fn a_power_failure_finds_what_the_checkpoint_lists() {
     let folder = toy::quick_folder();
-    let storage = Arc::new(Watching::default());
-    let toy = Toy::on(storage.clone());
+    let file_system = Arc::new(Watching::default());
+    let toy = Toy::on(file_system.clone());
     toy::run(&folder.path().join("run"), &toy).unwrap();
-    let watched = storage.0.lock().unwrap();
+    let watched = file_system.0.lock().unwrap();
     // One at the start, twenty commits, one at the end in place of the last. Only that stays.
     assert_eq!(watched.swaps, 22);
     assert_eq!(watched.removals, 20);
 }
 
-/// The storage that all tests above replace. Files in place of folders work for root, too, whom no
+/// The file system that all tests above replace. Files in place of folders work for root, too, whom no
 /// permission stops.
 #[test]
 fn the_real_disk_refuses_with_one_line() {

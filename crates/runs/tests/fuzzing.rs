@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ::fuzzing::{Fuzz, Limit, peak_of};
 use ciborium::Value;
-use runs::{Error, RunDirectory, State, StoredRun};
+use runs::{CheckpointState, Error, RunDirectory, StoredRun};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -32,12 +32,12 @@ impl Fixture {
     fn new() -> Self {
         let root = quick_folder();
         let folder = root.path().join("run");
-        let state = State::new(12, json!({ "a": [1, 2.5, null], "b": "text" }))
+        let state = CheckpointState::new(12, json!({ "a": [1, 2.5, null], "b": "text" }))
             .with_array("u", vec![0.1, -2.0, f64::NAN, 1e300])
             .with_array("empty", vec![]);
         let files = [("a", &b"abc"[..]), ("fields/b", b"")];
-        let storage = Arc::new(Quick);
-        let mut run = RunDirectory::create_on(storage, &folder, &files, &state).unwrap();
+        let file_system = Arc::new(Quick);
+        let mut run = RunDirectory::create_on(file_system, &folder, &files, &state).unwrap();
         run.replace_file("c.csv", b"").unwrap();
         run.finish(&state).unwrap();
         Self {
@@ -218,13 +218,13 @@ fn arrays_come_back_bit_for_bit() {
     let mut values = vec![-1.0; 10_000];
     (values[64], values[5000]) = (0.3, f64::NAN);
     values.extend([0.0, -0.0]);
-    let state = State::new(3, json!(null))
+    let state = CheckpointState::new(3, json!(null))
         .with_array("u", values)
         .with_array("nothing", vec![])
         .with_array("v", vec![-0.0; 65]);
     drop(RunDirectory::create_on(Arc::new(Quick), &folder, &[], &state).unwrap());
     let stored = StoredRun::find_on(Arc::new(Quick), &folder, false).unwrap();
-    let bits = |state: &State| -> Vec<Vec<u64>> {
+    let bits = |state: &CheckpointState| -> Vec<Vec<u64>> {
         let arrays = state.arrays.iter();
         arrays
             .map(|(_, values)| values.0.iter().map(|v| v.to_bits()).collect())

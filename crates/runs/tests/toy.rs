@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use files::Storage;
-use runs::{Error, Interrupt, RunDirectory, State, StoredRun};
+use files::FileSystem;
+use runs::{CheckpointState, Error, Interrupt, RunDirectory, StoredRun};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -25,7 +25,7 @@ pub const FILES: [(&str, &[u8]); 2] = [
 #[derive(Debug)]
 pub struct Quick;
 
-impl Storage for Quick {
+impl FileSystem for Quick {
     fn sync_file(&self, _: &File, _: &Path) -> io::Result<()> {
         Ok(())
     }
@@ -45,14 +45,14 @@ pub fn quick_folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
 
-fn beginning() -> State<'static> {
+fn beginning() -> CheckpointState<'static> {
     let values = (0..CELLS).map(|i| (i as f64 + 0.5) / CELLS as f64);
-    State::new(0, json!({ "time": 0.0, "largest": 0.0 }))
+    CheckpointState::new(0, json!({ "time": 0.0, "largest": 0.0 }))
         .with_array("u", values.collect::<Vec<f64>>())
         .with_array("means", vec![])
 }
 
-fn step(state: &mut State) {
+fn step(state: &mut CheckpointState) {
     state.step += 1;
     let time = state.notes["time"].as_f64().unwrap() + 0.1;
     let u = state.arrays.get_mut("u").unwrap().0.to_mut();
@@ -66,13 +66,13 @@ fn step(state: &mut State) {
     means.0.to_mut().push(mean);
 }
 
-fn metrics(state: &State) -> String {
+fn metrics(state: &CheckpointState) -> String {
     let means = state.array("means").unwrap();
     let rows = (means.iter().zip(1..)).map(|(mean, step)| format!("{step},{mean}\n"));
     "step,mean\n".to_owned() + &rows.collect::<String>()
 }
 
-pub fn state_at(step_number: u64) -> State<'static> {
+pub fn state_at(step_number: u64) -> CheckpointState<'static> {
     let mut state = beginning();
     while state.step < step_number {
         step(&mut state);
@@ -82,7 +82,7 @@ pub fn state_at(step_number: u64) -> State<'static> {
 
 /// How to run the toy.
 pub struct Toy {
-    pub storage: Arc<dyn Storage>,
+    pub file_system: Arc<dyn FileSystem>,
     pub interrupt: Interrupt,
     /// Time that a step takes.
     pub pause: Duration,
@@ -96,9 +96,9 @@ pub struct Toy {
 
 impl Toy {
     /// A toy that runs to the end without pauses.
-    pub fn on(storage: Arc<dyn Storage>) -> Self {
+    pub fn on(file_system: Arc<dyn FileSystem>) -> Self {
         Self {
-            storage,
+            file_system,
             interrupt: Interrupt::never(),
             pause: Duration::ZERO,
             stop: STEPS,
@@ -110,9 +110,9 @@ impl Toy {
 
 /// Starts or resumes the toy, commits every 3 steps and writes a field every 10.
 pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
-    let mut opened = StoredRun::find_on(toy.storage.clone(), folder, false);
+    let mut opened = StoredRun::find_on(toy.file_system.clone(), folder, false);
     if toy.recover && matches!(opened, Err(Error::Damaged { .. })) {
-        opened = StoredRun::find_on(toy.storage.clone(), folder, true);
+        opened = StoredRun::find_on(toy.file_system.clone(), folder, true);
     }
     let (mut run, mut state) = match opened {
         Ok(stored) if stored.is_finished() => return stored.tidy(),
@@ -122,7 +122,7 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         }
         Err(Error::NoRun(_)) => {
             let start = beginning();
-            let run = RunDirectory::create_on(toy.storage.clone(), folder, &FILES, &start)?;
+            let run = RunDirectory::create_on(toy.file_system.clone(), folder, &FILES, &start)?;
             toy.committed.set(Some(0));
             (run, start)
         }
@@ -143,8 +143,8 @@ pub fn run(folder: &Path, toy: &Toy) -> Result<(), Error> {
         }
         if state.step == 25 {
             let frames = run.path().join("frames/first");
-            files::make_folders_on(&*toy.storage, &frames)?;
-            files::write_atomically_on(&*toy.storage, frames.join("a.png"), |out| {
+            files::make_folders_on(&*toy.file_system, &frames)?;
+            files::write_atomically_on(&*toy.file_system, frames.join("a.png"), |out| {
                 out.write_all(b"a picture")
             })?;
             run.adopt_file("frames/first/a.png")?;

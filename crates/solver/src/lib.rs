@@ -30,7 +30,7 @@
 //! ```
 //!
 //! [`MinimizingMovement`] is the energy of a step as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its
-//! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`Method::Preconditioned`]), the
+//! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`NewtonVariant::Preconditioned`]), the
 //! held sizes ([`Problem::hold`]) and the further terms of the energy ([`EnergyTerm`], [`Problem::set_energy`]) are explained in
 //! `docs/algorithm.md`.
 //!
@@ -89,7 +89,7 @@ pub use mean_curvature_flow::MeanCurvatureFlow;
 pub use movement::{Minimizations, Minimum, Movement};
 pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
-pub use params::{FlowParams, Method, NewtonParams, Precision};
+pub use params::{FlowParams, NewtonParams, NewtonVariant, Precision};
 pub use problem::Problem;
 pub use record::{Start, StartKind, StepRecord};
 pub use scheme::{Candidate, Scheme, StepSize};

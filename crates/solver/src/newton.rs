@@ -1,6 +1,6 @@
 //! Newton's method for one minimizing movement.
 //!
-//! Two methods share the same inputs and outputs. [`Method::Preconditioned`] is the one to use. [`Method::Paper`] is the
+//! Two variants share the same inputs and outputs. [`NewtonVariant::Preconditioned`] is the one to use. [`NewtonVariant::Paper`] is the
 //! plain Newton-CG with Armijo's rule of the paper, kept for comparison.
 
 use std::cell::Cell;
@@ -14,7 +14,7 @@ use crate::constraints::{Place, Restoring, Tangent};
 use crate::preconditioner::{Level, Preconditioner};
 use crate::region::Region;
 use crate::times::{PhaseTimes, timed};
-use crate::{Error, Method, NewtonParams, Objective};
+use crate::{Error, NewtonParams, NewtonVariant, Objective};
 
 /// Why a minimization ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -148,7 +148,7 @@ pub(crate) fn minimize_timed<const D: usize>(
         held,
         params,
         device,
-        preconditioner: preconditioner.filter(|_| params.method == Method::Preconditioned),
+        preconditioner: preconditioner.filter(|_| params.variant == NewtonVariant::Preconditioned),
         previous,
         unknowns: previous.shape().num_elements() as f64,
         info: NewtonInfo {
@@ -161,9 +161,9 @@ pub(crate) fn minimize_timed<const D: usize>(
         },
         times,
     };
-    let (exit, (u, energy)) = match params.method {
-        Method::Preconditioned => minimizer.preconditioned(start)?,
-        Method::Paper => minimizer.paper()?,
+    let (exit, (u, energy)) = match params.variant {
+        NewtonVariant::Preconditioned => minimizer.preconditioned(start)?,
+        NewtonVariant::Paper => minimizer.paper()?,
     };
     (minimizer.info.exit, minimizer.info.energy) = (exit, energy);
     // Restoring adds nothing to values outside of the region, which makes 0.0 of -0.0: they are put back.

@@ -64,10 +64,10 @@ impl FlowParams {
     }
 }
 
-/// Which minimization.
+/// Which variant of Newton's method minimizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum NewtonVariant {
     /// Preconditioned Newton-CG with profile-preserving updates and cleanup.
     #[default]
     Preconditioned,
@@ -78,8 +78,9 @@ pub enum Method {
 /// Settings of the minimization.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewtonParams {
-    /// The method.
-    pub method: Method,
+    /// The variant of Newton's method.
+    #[serde(rename = "method")]
+    pub variant: NewtonVariant,
     /// Stop when the Newton decrement says that the minimizer is nearer than this fraction of the motion
     /// `u - u_k` (root mean squares).
     pub tolerance: f64,
@@ -101,7 +102,7 @@ pub struct NewtonParams {
 impl Default for NewtonParams {
     fn default() -> Self {
         Self {
-            method: Method::Preconditioned,
+            variant: NewtonVariant::Preconditioned,
             tolerance: 0.02,
             cg_tolerance: 0.1,
             linear_accuracy: None,

@@ -94,13 +94,18 @@ pub fn cross_of(cells: usize) -> Field<2> {
     field(grid, &Cross::new(0.8, 0.27).unwrap())
 }
 
-pub fn dented() -> Field<3> {
+fn dented() -> Field<3> {
+    dented_of(64)
+}
+
+/// With so many cells per side.
+pub fn dented_of(cells: usize) -> Field<3> {
     let dented = |x: [f64; 3]| {
         let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let [a, b, c] = x.map(|x| x / r.max(1e-9));
         r - 0.17 * (1.0 + 0.2 * (4.0 * a * b * c + 0.5 * c.powi(3) - 0.4 * a * a))
     };
-    field(Grid::centred(64, 0.5).unwrap(), &dented)
+    field(Grid::centred(cells, 0.5).unwrap(), &dented)
 }
 
 /// Gradient and Hessian-vector products of the energy on bricks with holes, about a field that is rough there.

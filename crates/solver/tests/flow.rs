@@ -10,8 +10,8 @@ use model::MeanCurvatureOperator;
 use operators::ComputeDevice;
 use serde_json::json;
 use solver::{
-    DeviceField, Error, Exit, FlowParams, Method, MinimizingMovement, NewtonParams, Objective,
-    PhaseTimes, Precision, StepRecord, minimize,
+    DeviceField, Error, Exit, FlowParams, MinimizingMovement, NewtonParams, NewtonVariant,
+    Objective, PhaseTimes, Precision, StepRecord, minimize,
 };
 use std::sync::Arc;
 
@@ -100,10 +100,10 @@ fn the_tolerance_is_the_error_relative_to_the_motion() {
 }
 
 #[test]
-fn both_methods_find_the_same_minimizer_at_different_cost() {
-    let run = |method| {
+fn both_variants_find_the_same_minimizer_at_different_cost() {
+    let run = |variant| {
         let mut flow = flow(NewtonParams {
-            method,
+            variant,
             tolerance: 0.02,
             ..NewtonParams::default()
         });
@@ -112,8 +112,8 @@ fn both_methods_find_the_same_minimizer_at_different_cost() {
         let later = steps(&mut flow, 3).iter().map(|r| r.newton.hvp).sum();
         (field, record.newton, later)
     };
-    let (fast, cheap, few): (_, _, usize) = run(Method::Preconditioned);
-    let (slow, plain, many): (_, _, usize) = run(Method::Paper);
+    let (fast, cheap, few): (_, _, usize) = run(NewtonVariant::Preconditioned);
+    let (slow, plain, many): (_, _, usize) = run(NewtonVariant::Paper);
     let motion = l2_distance(&fast, &ball(grid(), RADIUS)).unwrap();
     let difference = l2_distance(&fast, &slow).unwrap() / motion;
     assert!(difference < 0.02, "{difference}: {cheap:?} {plain:?}");

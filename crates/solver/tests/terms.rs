@@ -12,7 +12,7 @@ use solver::{
     MovementGraph, Objective, Precision, Pressure, StartKind, Tension,
 };
 
-use crate::bricks::{bricks, cross_of, dense, dented, difference_of, exact, holding, usual};
+use crate::bricks::{bricks, cross_of, dense, dented_of, difference_of, exact, holding, usual};
 use crate::common::flow::Flow;
 use crate::common::{accurate, device, dot, noise, params, passes_taylor_tests, values};
 use crate::domain::Both;
@@ -210,7 +210,7 @@ fn apart<const D: usize>(
 
 #[test]
 fn own_terms_on_bricks_are_those_of_the_whole_grid() {
-    let (plane, space) = (cross(), dented());
+    let (plane, space) = (cross(), dented_of(48));
     let [tau, quarter] = [plane.grid().spacing(), space.grid().spacing()].map(|h| h * h / 4.0);
     for (apart, energies) in [
         apart(&plane, exact(plane.grid()), &[tau; 2], |_| ()),
@@ -223,7 +223,7 @@ fn own_terms_on_bricks_are_those_of_the_whole_grid() {
 /// The inside that is not stored is most of the energy.
 #[test]
 fn energies_do_not_jump_where_bricks_change() {
-    let start = cross();
+    let start = cross_of(128);
     let tau = params(start.grid()).mcf_step / 2.0;
     let terms = || -> EnergyTerms<2> { vec![Arc::new(Gravity { g: -400.0 })] };
     let [whole, few] = [dense, bricks].map(|make| {

@@ -62,8 +62,8 @@ impl Residual {
             - u * rest.reshape([1; R])
     }
 
-    /// The mean square of its error.
-    fn loss(&self, (before, after): (Tensor<3>, Tensor<3>)) -> Tensor<1> {
+    /// The mean square of its error on circles before and after a step.
+    fn loss(&self, before: Tensor<3>, after: Tensor<3>) -> Tensor<1> {
         let error = self.forward(before) - after;
         (error.clone() * error).mean()
     }
@@ -87,7 +87,8 @@ fn train(device: &ComputeDevice) -> Result<Residual, Failure> {
     let mut adam = AdamConfig::new().with_epsilon(1e-10).init();
     for update in 0..UPDATES {
         let radii = [0.1, 0.2, 0.3].map(|r| r + 0.01 * f64::from(7 * update % 10));
-        let loss = network.loss(data.pairs(&radii, device));
+        let (before, after) = data.pairs(&radii, device);
+        let loss = network.loss(before, after);
         let gradients = GradientsParams::from_grads(loss.backward(), &network);
         let progress = f64::from(update) / f64::from(UPDATES);
         let rate = RATES[0] * (RATES[1] / RATES[0]).powf(progress);
@@ -101,7 +102,7 @@ fn relative_loss(network: &Residual, device: &ComputeDevice) -> Result<f64, Fail
     let (before, after) = data()?.pairs(&[0.115, 0.205, 0.305], device);
     let motion = after.clone() - before.clone();
     let identity = device.scalar((motion.clone() * motion).mean())?;
-    Ok(device.scalar(network.loss((before, after)))? / identity)
+    Ok(device.scalar(network.loss(before, after))? / identity)
 }
 
 /// The mean of a kernel over the symmetries of the grid.

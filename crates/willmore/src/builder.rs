@@ -4,15 +4,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use engine::{
-    Case, Checkpoints, Controller, ErrorControl, Measure, Observer, Operator, Own, Run, Scales,
-    Scheme, Stop, StopRule, Storage, Store, TimeSteps,
+    Case, Checkpoints, Controller, ErrorControl, Formulation, Measure, Observer, Operator, Own,
+    Run, Scales, Stop, StopRule, Storage, Store, TimeSteps,
 };
 use geometry::{Grid, NodeSet, SignedDistance, Stored, ZeroSet, stored_phase_field};
 use mean_curvature::{MeanCurvatureStep, StepScales};
 use model::{NamedNetwork, Network, Networks};
 use operators::ComputeDevice;
 use runs::{Interrupt, RunDirectory};
-use solver::{EnergyTerm, Held, NewtonParams, Target};
+use solver::{EnergyTerm, Held, NewtonParams, Scheme, Target};
 
 /// What a flow cannot begin with, or what stopped it.
 pub type Error = engine::Error;
@@ -29,7 +29,7 @@ const EPS_OVER_H: f64 = 2.0;
 pub struct Willmore<const D: usize> {
     grid: Grid<D>,
     eps_over_h: f64,
-    recipe: Scheme,
+    formulation: Formulation,
     network: Option<Network>,
     step: Option<Arc<dyn MeanCurvatureStep<D>>>,
     mcf_step: Option<f64>,
@@ -58,7 +58,7 @@ impl<const D: usize> Willmore<D> {
         Self {
             grid,
             eps_over_h: EPS_OVER_H,
-            recipe: Scheme::Accurate,
+            formulation: Formulation::Accurate,
             network: None,
             step: None,
             mcf_step: None,
@@ -84,8 +84,8 @@ impl<const D: usize> Willmore<D> {
 
     /// How the energy is weighted, and which of the shipped networks is inside.
     #[must_use]
-    pub fn recipe(mut self, recipe: Scheme) -> Self {
-        self.recipe = recipe;
+    pub fn formulation(mut self, formulation: Formulation) -> Self {
+        self.formulation = formulation;
         self
     }
 
@@ -120,7 +120,7 @@ impl<const D: usize> Willmore<D> {
 
     /// The scheme that makes steps, in place of that of second order.
     #[must_use]
-    pub fn scheme<S: solver::Scheme<D> + 'static>(
+    pub fn scheme<S: Scheme<D> + 'static>(
         mut self,
         make: impl Fn() -> S + Send + Sync + 'static,
     ) -> Self {
@@ -250,8 +250,7 @@ impl<const D: usize> Willmore<D> {
             Some(held) => held,
             None => self.kept(&initial, scales.eps)?,
         };
-        let steps = (self.steps, STEPS);
-        let mut case = Case::willmore("shape", initial, operator, scales, steps);
+        let mut case = Case::willmore("shape", initial, operator, scales, self.steps, STEPS);
         case.measures.extend(self.measures.iter().cloned());
         Ok(Case {
             held,
@@ -275,9 +274,9 @@ impl<const D: usize> Willmore<D> {
                 name: "own".to_owned(),
                 network: network.clone(),
             },
-            None => Networks::default().find(self.recipe.shipped(), &needed)?,
+            None => Networks::default().find(self.formulation.shipped(), &needed)?,
         };
-        Operator::learned(self.recipe, named)
+        Operator::learned(self.formulation, named)
     }
 
     /// The sizes of the start that are kept.

@@ -3,9 +3,9 @@
 pub use crate::Error as FlowError;
 pub use crate::{Kept, Willmore};
 pub use engine::{
-    Attempts, Case, Checkpoints, Controller, Current, EqualSteps, ErrorControl, Event, Measure,
-    Method, Observer, Operator, Order, Own, Progress, Record, Run, Samples, Scales,
-    Scheme as Recipe, StepControl, StepRule, Stop, StopRule, StopWhen, Storage, Store, TimeSteps,
+    Attempts, Case, Checkpoints, Controller, Current, Discretization, EqualSteps, ErrorControl,
+    Event, Formulation, Measure, Method, Observer, Operator, Order, Own, Progress, Record, Run,
+    Samples, Scales, StepControl, StepRule, Stop, StopRule, StopWhen, Storage, Store, TimeSteps,
     Trajectory, Verdict,
 };
 pub use fem::FiniteElementStep;

@@ -8,9 +8,9 @@ pub use std::time::Instant;
 
 pub use clap::{Args, Parser, ValueEnum};
 pub use engine::{
-    Case, ErrorControl, Flow, Held, Measure, Method, Operator, Order, Record, Run, Samples, Scales,
-    Scheme, StepRule, Stop, Storage, Target, TimeSteps, Trajectory, energy_increases, mean_hvp,
-    minimizations, total_hvp,
+    Case, Discretization, ErrorControl, Flow, Formulation, Held, Measure, Method, Operator, Order,
+    Record, Run, Samples, Scales, StepRule, Stop, Storage, Target, TimeSteps, Trajectory,
+    energy_increases, mean_hvp, minimizations, total_hvp,
 };
 pub use geometry::measure::{BoundingBox, l2_distance, zero_set_volume};
 pub use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Ellipse};
@@ -23,7 +23,7 @@ pub use operators::{ComputeDevice, DeviceKind, memory};
 pub use report::Format::{self, Fixed, Scientific, Shortest};
 pub use report::{
     Axis, Cell, Colour, Curve, Figure, LegendEntry, LineChart, LineStyle, Marker, Numbers,
-    OutputDir, Progress, Raster, Series, Shapes, Sheet,
+    OutputDir, ProgressBars, Raster, Series, Shapes, Sheet,
 };
 pub use serde::Serialize;
 pub use serde_json::{Value, json};

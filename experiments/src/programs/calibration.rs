@@ -205,15 +205,17 @@ fn odd_part(one: &NamedNetwork) -> NamedNetwork {
 
 /// Willmore energy and phase field after one small step with these factors.
 fn relaxed<const D: usize>(
-    (named, factors): (&NamedNetwork, Factors),
+    named: &NamedNetwork,
+    factors: Factors,
     initial: &Field<D>,
     scales: Scales,
     device: &ComputeDevice,
 ) -> Result<(f64, Field<D>)> {
-    let mut operator = Operator::learned(Scheme::Paper, named.clone())?;
+    let mut operator = Operator::learned(Formulation::Paper, named.clone())?;
     operator.factors = factors;
-    let time = (StepRule::Constant(STEP_RATIO * scales.mcf_step), 1);
-    let case = Case::willmore("surface at rest", initial.clone(), operator, scales, time);
+    let (title, initial) = ("surface at rest", initial.clone());
+    let rule = StepRule::Constant(STEP_RATIO * scales.mcf_step);
+    let case = Case::willmore(title, initial, operator, scales, rule, 1);
     let mut run = Run::new(case, device)?;
     let energy = run.step()?.and_then(Record::willmore_energy);
     Ok((energy.unwrap_or(f64::NAN), run.field().clone()))
@@ -269,7 +271,7 @@ fn discs(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<DiscRow>> {
         let disc = disc.map(|u| sign * u);
         // Over that of the zero level set of the relaxed disc, `pi / R`.
         let energy = |factors| -> Result<f64> {
-            let (energy, field) = relaxed((one, factors), &disc, scales(), stage.device)?;
+            let (energy, field) = relaxed(one, factors, &disc, scales(), stage.device)?;
             let inside = zero_set_volume(&field);
             let outside = grid.side().powi(2) - inside;
             let area = if phase > 0 { inside } else { outside };
@@ -349,7 +351,7 @@ fn balls_and_tori(all: &[NamedNetwork], stage: &Stage<'_>) -> Result<Vec<Surface
         let (odd, factors) = (odd_part(one), one.network.calibration()?.factors);
         for (surface, initial, exact) in &shapes {
             let energy = |factors| -> Result<f64> {
-                Ok(relaxed((&odd, factors), initial, scales, stage.device)?.0 / exact)
+                Ok(relaxed(&odd, factors, initial, scales, stage.device)?.0 / exact)
             };
             rows.push(SurfaceRow {
                 network: one.name.clone(),

@@ -127,7 +127,7 @@ fn program(options: &Options) -> Result<()> {
     let usual = |method: Method, _| method.is_learned() || options.study.full;
     let limit = options.elements_up_to.unwrap_or(usize::MAX);
     let mut willmore = options.study.variants(Flow::Willmore, usual);
-    willmore.retain(|variant| variant.method.is_learned() || variant.n <= limit);
+    willmore.retain(|variant| variant.discretization.method.is_learned() || variant.n <= limit);
     let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true);
     let variants = [mean_curvature, willmore].concat();
     let study = Study::new(&options.study.networks, &variants)?;
@@ -141,10 +141,10 @@ fn program(options: &Options) -> Result<()> {
     let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut ensembles = Vec::new();
     for planned in &study.plan {
-        let Variant { flow, n, .. } = planned.0;
-        let title = format!("{}, {}, n = {n}", flow.title(), planned.0.label());
+        let Variant { flow, n, .. } = planned.variant;
+        let title = format!("{}, {}, n = {n}", flow.title(), planned.variant.label());
         ensembles.push(session.phase(title, |stage| {
-            Ensemble::run(planned, (count, steps), FINISHED, stage)
+            Ensemble::run(planned, count, steps, FINISHED, stage)
         })?);
     }
     let report = Report {
@@ -250,18 +250,21 @@ impl Report {
         })
     }
 
-    /// Error at the end over the mean wall time of a circle, a curve for each method and scheme.
+    /// Error at the end over the mean wall time of a circle, a curve for each discretization.
     fn cost(&self) -> Figure {
         let steps = self.steps;
-        let own = |look| (self.of_flow(Flow::Willmore)).filter(move |e| e.variant.look() == look);
-        let shown = study::methods_in_schemes().filter(|&look| own(look).next().is_some());
-        let curves = shown.map(|(method, scheme)| {
-            let cells = own((method, scheme)).map(|e| e.variant.n.to_string());
+        let own = |discretization| {
+            let ensembles = self.of_flow(Flow::Willmore);
+            ensembles.filter(move |e| e.variant.discretization == discretization)
+        };
+        let shown = study::discretizations().filter(|&one| own(one).next().is_some());
+        let curves = shown.map(|discretization| {
+            let cells = own(discretization).map(|e| e.variant.n.to_string());
             let cells: Vec<String> = cells.collect();
-            let name = format!("{}, n = {}", method.label_in(scheme), cells.join(", "));
+            let name = format!("{}, n = {}", discretization.label(), cells.join(", "));
             let point = |e: &Ensemble| [e.seconds_per_step() * steps as f64, e.mean_error(steps)];
-            Series::of(name, own((method, scheme)), point)
-                .with_colour(study::colour(method, scheme))
+            Series::of(name, own(discretization), point)
+                .with_colour(study::colour(discretization))
                 .with_marker(Marker::Circle)
         });
         let error = Axis::log(format!("mean L² error at t = {:.4}", time(steps)));
@@ -295,7 +298,7 @@ impl Report {
                 if e.variant.flow == Flow::Willmore {
                     // Without the beginning.
                     let run = (e.variant, circle.radius);
-                    steps.extend(steps::of(run, &circle.trajectory).skip(1));
+                    steps.extend(step_table::rows(run, &circle.trajectory).skip(1));
                 }
             }
         }
@@ -308,7 +311,7 @@ impl Report {
         session.csv(sheet, "circles")?;
         let sheet = Variant::columns(Sheet::of(&steps), |step| step.run.0);
         let sheet = sheet.data("radius", |step| step.run.1);
-        session.csv(steps::columns(sheet, &steps), "steps")
+        session.csv(step_table::columns(sheet, &steps), "steps")
     }
 
     /// The mean errors, and of Willmore flow the work.
@@ -320,7 +323,7 @@ impl Report {
             .text("method", |e| e.variant.label());
         for k in self.shown_steps() {
             let (metric, head) = (format!("l2.step{k}"), format!("step {k}"));
-            sheet = sheet.measure(&metric, (&head, Fixed(5)), |e| e.mean_error(k));
+            sheet = sheet.measure(&metric, &head, Fixed(5), |e| e.mean_error(k));
         }
         // Of Willmore flow.
         let seconds = |e: &Ensemble| e.minimizations().next().map(|_| e.seconds_per_step());
@@ -330,7 +333,7 @@ impl Report {
         let raised =
             |r: &StepRecord| r.energy >= r.energy_before || r.willmore_energy > r.energy_at_rest();
         sheet
-            .measure("hvp_per_step", ("HVP/step", Fixed(1)), hvp)
+            .measure("hvp_per_step", "HVP/step", Fixed(1), hvp)
             .metric("newton_per_step", newton)
             .metric("seconds_per_step", seconds)
             .metric("energy_increases", |e| e.total(|r| raised(r).into()))

@@ -151,8 +151,8 @@ fn program(options: &Options) -> Result<()> {
             if noise.to_bits() == noises[0].to_bits() {
                 let results = [0, 2, 3, 1].map(|k: usize| (methods[k].method, &methods[k].result));
                 let shown = [("clean", clean.mesh.mesh())].into_iter().chain(results);
-                let frame = (clean.up, clean.mesh.bounding_box());
-                let drawn = shown.map(|(name, mesh)| mesh_raster(mesh, frame, name));
+                let (up, frame) = (clean.up, clean.mesh.bounding_box());
+                let drawn = shown.map(|(name, mesh)| mesh_raster(mesh, up, frame, name));
                 pictures.extend(session.phase::<Vec<_>>("pictures", |_| drawn.collect())?);
             }
             rows.extend(methods);

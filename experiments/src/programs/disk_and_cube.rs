@@ -1,6 +1,6 @@
 use crate::prelude::*;
-use crate::surfaces::{self, Flowed, SchemeOptions, Setting, Surface, VIEW};
-use crate::truth::{DISK, ELLIPSOID, Reached, Sample, THICK_DISK, Truth};
+use crate::surfaces::{self, Flowed, FormulationOptions, Setting, Surface, VIEW};
+use crate::truth::{DISK, ELLIPSOID, Halves, Reached, Sample, THICK_DISK, Truth};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "disk_and_cube",
@@ -84,23 +84,29 @@ struct Options {
     methods: Vec<Method>,
 
     #[command(flatten)]
-    schemes: SchemeOptions,
+    formulations: FormulationOptions,
 }
 
 fn program(options: &Options) -> Result<()> {
     let [radius, half_height] = THICK_DISK;
     let run = &options.figure.run;
     let steps = (options.steps).unwrap_or(if run.quick { 2 } else { STEPS });
-    // Finite elements are the paper's reference, unless another scheme is wanted of all.
-    let variants = |&method: &Method| match (method.is_learned(), options.schemes.scheme) {
-        (true, _) => options.schemes.learned(),
-        (false, None | Some(Scheme::Paper)) => vec![(method, Scheme::Paper)],
-        (false, Some(_)) => vec![(method, Scheme::Calibrated)],
+    // Finite elements are the paper's reference, unless another formulation is wanted of all.
+    let elements = match options.formulations.formulation {
+        None | Some(Formulation::Paper) => Formulation::Paper,
+        Some(_) => Formulation::Calibrated,
     };
-    let variants: Vec<_> = options.methods.iter().flat_map(variants).collect();
+    let of_method = |&method: &Method| {
+        if method.is_learned() {
+            options.formulations.learned()
+        } else {
+            vec![Discretization::new(method, elements)]
+        }
+    };
+    let discretizations: Vec<_> = options.methods.iter().flat_map(of_method).collect();
     let message = "--steps must be at least 1, and --methods must name a method";
-    require(steps > 0 && !variants.is_empty(), message)?;
-    let setting = Setting::new(&options.figure, &variants, CELLS, 1.0)?;
+    require(steps > 0 && !discretizations.is_empty(), message)?;
+    let setting = Setting::new(&options.figure, &discretizations, CELLS, 1.0)?;
     let (n, grid, eps) = (setting.n, setting.grid, setting.scales.eps);
     let cube = Cuboid::new([CUBE_HALF_SIDE; 3])?.translated([0.5; 3]);
     let disk = Cylinder::new(radius, half_height)?.translated([0.5; 3]);
@@ -117,27 +123,33 @@ fn program(options: &Options) -> Result<()> {
         start("cube", "cube", &cube, CUBE_ENERGIES)?,
         start("disk", "thick disk", &disk, DISK_ENERGIES)?,
     ];
+    let variants = discretizations.iter();
+    let variants: Vec<_> = variants.map(|one| (one.method, one.formulation)).collect();
     let others = json!({
         "tau": TAU, "steps": steps, "variants": variants, "cube_half_side": CUBE_HALF_SIDE, "disk_radius": radius,
         "disk_half_height": half_height,
     });
     let parameters = setting.parameters(others)?;
     let session = Session::open(EXPERIMENT.name, run, parameters)?;
-    let time = (StepRule::Constant(TAU).into(), steps);
+    let rule = StepRule::Constant(TAU).into();
     let comparisons = |session: &mut Session, all: &mut [Flowed]| {
         compare_with_finite_elements(session, all)?;
         let mut rows = Vec::new();
         for sample in [&DISK, &ELLIPSOID] {
-            rows.extend(compare_with_exact(session, sample, n, (TAU, steps))?);
+            rows.extend(compare_with_exact(session, sample, n, steps)?);
         }
         session.sheet(sheet(&rows, n), "exact")?;
         Ok(String::new())
     };
-    setting.run(session, TITLE, &surfaces, time, comparisons)
+    setting.run(session, TITLE, &surfaces, rule, steps, comparisons)
 }
 
-/// A surface of revolution, its run in controlled steps or extrapolated, and what that has reached.
-type Compared = (&'static str, String, Reached);
+/// What a run of a surface of revolution, in controlled steps or extrapolated, has reached.
+struct Compared {
+    surface: &'static str,
+    run: String,
+    reached: Reached,
+}
 
 /// Lets a surface flow in controlled steps of second order, and compares it and its extrapolation in `eps` with the exact flow after
 /// 1, 2, 4, ... 64 and all steps of the paper.
@@ -145,46 +157,52 @@ fn compare_with_exact(
     session: &mut Session,
     sample: &Sample<3>,
     n: usize,
-    (tau, steps): (f64, usize),
+    steps: usize,
 ) -> Result<Vec<Compared>> {
     let powers = (0..=HALVINGS).map(|k| 1_usize << k).filter(|k| *k < steps);
-    let marks = powers.chain([steps]).map(|k| (k, k as f64 * tau));
+    let marks = powers.chain([steps]).map(|k| (k, k as f64 * TAU));
     let marks: Vec<(usize, f64)> = marks.collect();
     let title = format!("{}: the exact flow", sample.title);
     let exact = session.phase(title, |_| sample.exact(Flow::Willmore, &marks))?;
     (exact.iter()).try_for_each(|exact| exact.record(session, sample.key))?;
-    let ramp = (tau * f64::from(1 << HALVINGS), HALVINGS);
+    let halves = Halves {
+        end: TAU * f64::from(1 << HALVINGS),
+        halvings: HALVINGS,
+    };
     let all: Vec<&Truth> = exact.iter().collect();
-    let runs = sample.second_order(session, n, ramp, &all)?;
+    let runs = sample.second_order(session, n, halves, &all)?;
     let mut rows = Vec::new();
     let names = [format!("n = {n}"), "extrapolated".to_owned()];
     for (run, reached) in names.into_iter().zip(runs) {
-        let reached = reached.into_iter();
-        rows.extend(reached.map(|reached| (sample.title, run.clone(), reached)));
+        rows.extend(reached.into_iter().map(|reached| Compared {
+            surface: sample.title,
+            run: run.clone(),
+            reached,
+        }));
     }
     Ok(rows)
 }
 
 fn sheet(rows: &[Compared], n: usize) -> Sheet<'_, Compared> {
     let mut sheet = Sheet::of(rows)
-        .text("surface", |row| row.0)
-        .text("run", |row| &row.1)
-        .column("step", Shortest, |row| row.2.mark);
+        .text("surface", |row| row.surface)
+        .text("run", |row| &row.run)
+        .column("step", Shortest, |row| row.reached.mark);
     for (name, digits) in [("area", 5), ("volume", 5), ("w", 3)] {
         let (exact, format) = (format!("exact {name}"), Fixed(digits));
         sheet = sheet
-            .column(name, format, |row| row.2.numbers[name])
-            .column(exact, format, |row| row.2.exact[name]);
+            .column(name, format, |row| row.reached.numbers[name])
+            .column(exact, format, |row| row.reached.exact[name]);
     }
-    let distance = |row: &Compared| row.2.numbers["distance_to_exact"] * n as f64;
+    let distance = |row: &Compared| row.reached.numbers["distance_to_exact"] * n as f64;
     sheet
         .column("largest distance / h", Fixed(3), distance)
-        .column("HVP", Fixed(0), |row| row.2.numbers["hvp_total"])
+        .column("HVP", Fixed(0), |row| row.reached.numbers["hvp_total"])
 }
 
 /// Adds the L2 distances of the learned operators to the finite elements, where both ran, to captions and metrics.
 fn compare_with_finite_elements(session: &mut Session, all: &mut [Flowed]) -> Result<()> {
-    let method = |one: &Flowed| one.trajectory.case.operator.method;
+    let method = |one: &Flowed| one.trajectory.case.operator.discretization.method;
     let (elements, mut others): (Vec<_>, Vec<_>) =
         (all.iter_mut()).partition(|one| method(one) == Method::FeImplicit);
     for one in others.iter_mut().filter(|one| method(one).is_learned()) {

@@ -58,8 +58,8 @@ fn program(Options { run: options }: &Options) -> Result<()> {
             curve: exact.curve,
         };
         let initial = equilibrium.start(grid, scales.eps, 0.0)?;
-        let (start, flow) = (("ellipse", initial), (operator.clone(), scales));
-        all.push(equilibrium.relax(&mut session, start, flow, None)?);
+        let (session, operator) = (&mut session, operator.clone());
+        all.push(equilibrium.relax(session, "ellipse", initial, operator, scales, None)?);
     }
     let panels = all.iter().map(|one| {
         let (w, exact) = (one.energy(), one.exact_energy());

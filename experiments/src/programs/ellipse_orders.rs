@@ -63,11 +63,12 @@ fn program(Options { run: options }: &Options) -> Result<()> {
     let mut run = |size: f64, n: usize, parts: usize| {
         let operator = Chosen::default().operator(ACCURATE, n)?;
         let initial = phase_field(Grid::per_unit(n, SIDE)?, &Ellipse::new(HALF_AXES)?, EPS)?;
-        let time = (STEP / parts as f64, steps * parts);
-        let mut case = planar_flow((Flow::Willmore, &operator), "ellipse", initial, time);
+        let (flow, shape) = (Flow::Willmore, "ellipse");
+        let (tau, count) = (STEP / parts as f64, steps * parts);
+        let mut case = planar_flow(flow, &operator, shape, initial, tau, count);
         case.scales.newton.tolerance = TOLERANCE;
         let name = format!("n{n}-{parts}");
-        let end = session.trajectory(&name, case, &name, &Samples::every(time.1))?;
+        let end = session.trajectory(&name, case, &name, &Samples::every(count))?;
         Ok::<_, Error>((size, end))
     };
     let in_h = CELLS[..used].iter().map(|&n| run(1.0 / n as f64, n, 1));
@@ -84,8 +85,8 @@ fn program(Options { run: options }: &Options) -> Result<()> {
         .text("refined", |row| row.refined)
         .column("size", Scientific(2), |row| row.size)
         .column("to the finest", Scientific(2), |row| row.to_finest)
-        .measure("to_next", ("to the next", Scientific(2)), |row| row.to_next)
-        .measure("order", ("order", Fixed(2)), |row| row.order);
+        .measure("to_next", "to the next", Scientific(2), |row| row.to_next)
+        .measure("order", "order", Fixed(2), |row| row.order);
     session.sheet(sheet, "orders")?;
     session.finish(&format!("{TITLE}: orders of convergence"))
 }

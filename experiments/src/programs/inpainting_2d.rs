@@ -94,12 +94,13 @@ fn program(options: &Options) -> Result<()> {
     }
     let ratios = Ratios::of_run(2, WIDTH, 1.0 / n as f64, scales.eps, scales.mcf_step);
     ratios.validate()?;
-    let (scheme, needed) = (options.common.scheme, NeededNetwork::exactly(ratios));
-    let needs = takes_networks((Method::Hybrid, scheme)).then_some(needed);
+    let (formulation, needed) = (options.common.formulation, NeededNetwork::exactly(ratios));
+    let discretization = Discretization::new(Method::Hybrid, formulation);
+    let needs = takes_networks(discretization).then_some(needed);
     let networks = options.common.figure.networks.load(needs.as_slice())?;
-    let operator = networks.learned(scheme, &needed)?;
+    let operator = networks.learned(formulation, &needed)?;
     let shapes = shapes(run.quick)?;
-    let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
+    let parameters = inpainting::parameters(n, &scales, &operator, &shapes);
     let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut trajectories = Vec::new();
     for shape in &shapes {

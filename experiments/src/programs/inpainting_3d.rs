@@ -106,12 +106,12 @@ fn program(options: &Options) -> Result<()> {
         "--extra-steps {extra_steps} is too many: each step is twice as long as the one before; give at most {MOST_EXTRA}"
     );
     require(extra_steps <= MOST_EXTRA, message)?;
-    let variant = (Method::Hybrid, options.common.scheme);
-    let setting = Setting::new(&options.common.figure, &[variant], CELLS, 1.0)?;
+    let discretization = Discretization::new(Method::Hybrid, options.common.formulation);
+    let setting = Setting::new(&options.common.figure, &[discretization], CELLS, 1.0)?;
     let (n, grid, scales) = (setting.n, setting.grid, setting.scales);
-    let operator = setting.operator(variant)?;
+    let operator = setting.operator(discretization)?;
     let (shapes, azimuths): (Vec<_>, Vec<_>) = shapes(extra_steps)?.into_iter().unzip();
-    let parameters = inpainting::parameters((n, &scales), &operator, &shapes);
+    let parameters = inpainting::parameters(n, &scales, &operator, &shapes);
     let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
     let mut flowed = Vec::new();
     for (shape, azimuth) in shapes.iter().zip(azimuths) {

@@ -51,7 +51,7 @@ fn program(options: &Options) -> Result<()> {
     let chosen = options.networks.load(&needs)?;
     let mut networks: Vec<(NetworkSpec, Network)> = Vec::new();
     for (&spec, need) in specs.iter().zip(&needs) {
-        networks.push((spec, chosen.find(Scheme::Paper, need)?.network));
+        networks.push((spec, chosen.find(Formulation::Paper, need)?.network));
     }
     let checksums = (networks.iter()).map(|(spec, network)| (spec.name, network.fingerprint()));
     let checksums: BTreeMap<_, _> = checksums.collect();

@@ -53,7 +53,7 @@ fn program(options: &Options) -> Result<()> {
         eprintln!("warning: {path}: {warning}");
     }
     let grid = Grid::<3>::new(options.cells, 1.0)?;
-    let progress = Progress::new(options.quiet);
+    let progress = ProgressBars::new(options.quiet);
     let bar = progress.bar("signed distance".to_owned(), options.cells as u64);
     let placement = Placement::fit(&mesh.bounding_box(), &grid, options.side_length)?;
     let distance = MeshDistance::new(&mesh.placed(&placement));

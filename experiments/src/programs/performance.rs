@@ -208,16 +208,16 @@ fn program(options: &Options) -> Result<()> {
     let mut all = Vec::new();
     let shape = run.either("disc", "cross");
     for &n in planes {
-        let operator = networks.learned(Scheme::Paper, &convergence_network(n)?)?;
+        let operator = networks.learned(Formulation::Paper, &convergence_network(n)?)?;
         let case = timing::plane(&operator, n, if quick { 2 } else { 128 }, quick)?;
         all.push(Measurement::of(shape, &case, &mut session, turns)?);
     }
     let stored = options.storage.measure(&mut session)?;
     for (name, n, steps) in solids {
-        let operator = networks.learned(Scheme::Paper, &surfaces::needed_network())?;
-        let time = (StepRule::Constant(0.5_f64.powi(18)), steps);
-        let initial = solid_shape(name, n)?;
-        let case = Case::willmore(name, initial, operator, surfaces::scales(n), time);
+        let operator = networks.learned(Formulation::Paper, &surfaces::needed_network())?;
+        let (initial, scales) = (solid_shape(name, n)?, surfaces::scales(n));
+        let rule = StepRule::Constant(0.5_f64.powi(18));
+        let case = Case::willmore(name, initial, operator, scales, rule, steps);
         all.push(Measurement::of(name, &case, &mut session, turns)?);
     }
     let steps = Sheet::of(&all)

@@ -76,11 +76,11 @@ struct Options {
 
 struct Measurement {
     radius: f64,
-    /// Errors of mean curvature flow, in the order of [`variants`], for each of the reported steps.
+    /// Errors of mean curvature flow, in the order of [`of_mcf`], for each of the reported steps.
     mcf: Vec<[f64; MCF_STEPS.len()]>,
     /// `w` with the implicit finite-element step and the mass-matrix norm, as the paper measures.
     w_elements: f64,
-    /// Willmore flow by the learned operator, in every scheme: [`MEASURES`] and `energy_increases`.
+    /// Willmore flow by the learned operator, in every formulation: [`MEASURES`] and `energy_increases`.
     willmore: Vec<Numbers>,
 }
 
@@ -93,19 +93,26 @@ const MEASURES: [(&str, Format, &str); 4] = [
     ("HVP/step", Fixed(1), "hvp_per_step"),
 ];
 
-/// Methods and schemes of mean curvature flow.
-fn variants() -> impl Iterator<Item = (Method, Scheme)> {
-    study::methods_in_schemes()
-        .filter(|(method, scheme)| method.schemes(Flow::MeanCurvature).contains(scheme))
+/// The discretizations of mean curvature flow.
+fn of_mcf() -> impl Iterator<Item = Discretization> {
+    study::discretizations().filter(|one| {
+        let formulations = one.method.formulations(Flow::MeanCurvature);
+        formulations.contains(&one.formulation)
+    })
+}
+
+/// The learned operator in every formulation.
+fn learned() -> impl Iterator<Item = Discretization> {
+    let formulations = Method::Hybrid.formulations(Flow::Willmore).iter();
+    formulations.map(|&formulation| Discretization::new(Method::Hybrid, formulation))
 }
 
 fn program(options: &Options) -> Result<()> {
     let run = &options.figure.run;
     let radii = if run.quick { &RADII[2..4] } else { &RADII };
     let willmore_steps = if run.quick { 2 } else { WILLMORE_STEPS };
-    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter();
-    let variants: Vec<_> = schemes.map(|&scheme| (Method::Hybrid, scheme)).collect();
-    let setting = Setting::new(&options.figure, &variants, CELLS, BOX)?;
+    let discretizations: Vec<_> = learned().collect();
+    let setting = Setting::new(&options.figure, &discretizations, CELLS, BOX)?;
     let end = MCF_STEPS[LAST] as f64 * setting.scales.mcf_step;
     let message =
         "the smallest sphere vanishes within the steps of mean curvature flow: give more --cells";
@@ -145,24 +152,26 @@ fn measure(
     let (grid, scales) = (setting.grid, setting.scales);
     let ball = move |grid, radius| phase_field(grid, &Ball::new([0.5; 3], radius)?, scales.eps);
     let shape = format!("sphere of radius {radius}");
-    let case = |variant, tau, steps| -> Result<Case<3>> {
-        let (initial, operator) = (ball(grid, radius)?, setting.operator(variant)?);
-        let time = (StepRule::Constant(tau), steps);
-        Ok(Case::willmore(&shape, initial, operator, scales, time))
+    let case = |discretization, tau, steps| -> Result<Case<3>> {
+        let (initial, operator) = (ball(grid, radius)?, setting.operator(discretization)?);
+        let rule = StepRule::Constant(tau);
+        Ok(Case::willmore(
+            &shape, initial, operator, scales, rule, steps,
+        ))
     };
     let mut mcf = Vec::new();
-    for variant in variants() {
+    for discretization in of_mcf() {
         let exact = move |grid, t| ball(grid, mean_curvature_radius(radius, t, 3));
         let run = stage.run(Case {
             flow: Flow::MeanCurvature,
             measures: vec![Measure::distance_to(exact)],
-            ..case(variant, scales.mcf_step, MCF_STEPS[LAST])?
+            ..case(discretization, scales.mcf_step, MCF_STEPS[LAST])?
         })?;
         mcf.push(MCF_STEPS.map(|step| run.records()[step - 1].measures["l2"]));
     }
     let mut willmore = Vec::new();
-    for &scheme in Method::Hybrid.schemes(Flow::Willmore) {
-        let run = stage.run(case((Method::Hybrid, scheme), TAU, willmore_steps)?)?;
+    for discretization in learned() {
+        let run = stage.run(case(discretization, TAU, willmore_steps)?)?;
         let (records, last) = (run.records(), run.records().last());
         // Of the ball with that volume.
         let radius = |volume: f64| (0.75 * volume / PI).cbrt();
@@ -193,25 +202,25 @@ fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
     let mut sheet = Sheet::of(all)
         .keyed(|m, name| format!("spheres.r{:03.0}.{name}", 100.0 * m.radius))
         .column("radius", Fixed(2), |m| m.radius);
-    for (k, (method, scheme)) in variants().enumerate() {
+    for (k, discretization) in of_mcf().enumerate() {
         for (j, step) in MCF_STEPS.into_iter().enumerate() {
-            let head = format!("MCF error, {}, step {step}", method.label_in(scheme));
-            let metric = format!("mcf.{}.l2.step{step}", method.key_in(scheme));
-            sheet = sheet.measure(&metric, (&head, Fixed(5)), |m| m.mcf[k][j]);
+            let head = format!("MCF error, {}, step {step}", discretization.label());
+            let metric = format!("mcf.{}.l2.step{step}", discretization.key());
+            sheet = sheet.measure(&metric, &head, Fixed(5), |m| m.mcf[k][j]);
         }
     }
     let relative = |m: &Measurement| m.w_elements / WILLMORE_ENERGY_SPHERE;
-    sheet = sheet.measure("w", ("w, FE measure", Fixed(2)), |m| m.w_elements);
+    sheet = sheet.measure("w", "w, FE measure", Fixed(2), |m| m.w_elements);
     sheet = sheet.column("w / 8π (FE)", Fixed(4), relative);
-    for (k, &scheme) in Method::Hybrid.schemes(Flow::Willmore).iter().enumerate() {
-        let prefix = match scheme {
-            Scheme::Paper => String::new(),
-            other => format!("{}.", Method::Hybrid.key_in(other)),
+    for (k, discretization) in learned().enumerate() {
+        let prefix = match discretization {
+            PAPERS => String::new(),
+            other => format!("{}.", other.key()),
         };
-        let label = Method::Hybrid.label_in(scheme);
+        let label = discretization.label();
         for (head, format, name) in MEASURES {
             let (metric, head) = (format!("{prefix}{name}"), format!("{head}, {label}"));
-            sheet = sheet.measure(&metric, (&head, format), |m| m.willmore[k][name]);
+            sheet = sheet.measure(&metric, &head, format, |m| m.willmore[k][name]);
         }
         let increases = |m: &Measurement| m.willmore[k]["energy_increases"];
         sheet = sheet.metric(&format!("{prefix}energy_increases"), increases);
@@ -219,36 +228,33 @@ fn sheet(all: &[Measurement]) -> Sheet<'_, Measurement> {
     sheet
 }
 
-/// The curve of a method; markers tell schemes apart where lines are short.
+/// The curve of a discretization; markers tell formulations apart where lines are short.
 fn curve(
-    (method, scheme): (Method, Scheme),
+    discretization: Discretization,
     all: &[Measurement],
     value: impl Fn(&Measurement) -> f64,
 ) -> Series {
-    let marker = match scheme {
-        Scheme::Paper => Marker::Circle,
-        Scheme::Calibrated => Marker::Triangle,
-        Scheme::Accurate => Marker::Diamond,
+    let marker = match discretization.formulation {
+        Formulation::Paper => Marker::Circle,
+        Formulation::Calibrated => Marker::Triangle,
+        Formulation::Accurate => Marker::Diamond,
     };
-    Series::of(method.label_in(scheme), all, |m| [m.radius, value(m)])
-        .with_colour(study::colour(method, scheme))
+    Series::of(discretization.label(), all, |m| [m.radius, value(m)])
+        .with_colour(study::colour(discretization))
         .with_marker(marker)
 }
 
 fn errors(all: &[Measurement]) -> LineChart {
     let title = format!("Mean curvature flow, {} steps", MCF_STEPS[LAST]);
-    let curves = variants().enumerate();
-    let curves = curves.map(|(k, variant)| curve(variant, all, |m| m.mcf[k][LAST]));
+    let curves = of_mcf().enumerate();
+    let curves = curves.map(|(k, one)| curve(one, all, |m| m.mcf[k][LAST]));
     LineChart::new(title, Axis::linear("radius"), Axis::log("L² error")).with_curves(curves)
 }
 
 fn energies(all: &[Measurement]) -> LineChart {
     let elements = Series::of("implicit FE measure", all, |m| [m.radius, m.w_elements]);
-    let schemes = Method::Hybrid.schemes(Flow::Willmore).iter().enumerate();
-    let relaxed = schemes.map(|(k, &scheme)| {
-        let w = |m: &Measurement| m.willmore[k]["w_relaxed"];
-        curve((Method::Hybrid, scheme), all, w)
-    });
+    let relaxed = learned().enumerate();
+    let relaxed = relaxed.map(|(k, one)| curve(one, all, |m| m.willmore[k]["w_relaxed"]));
     let exact = Series::of("exact, 8π", all, |m| [m.radius, WILLMORE_ENERGY_SPHERE])
         .with_colour(Colour::Black)
         .with_style(LineStyle::Dashed);

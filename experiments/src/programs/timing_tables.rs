@@ -3,7 +3,7 @@ use crate::prelude::*;
 use crate::{surfaces, timing};
 use engine::Method::{FeImplicit, FeSemi, Hybrid};
 use fem::LinearSolver::{self, ConjugateGradients, Direct};
-use solver::Method::{self as Newton, Paper, Preconditioned};
+use solver::NewtonVariant::{self, Paper, Preconditioned};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "timing_tables",
@@ -102,7 +102,7 @@ struct Variant {
     key: &'static str,
     label: &'static str,
     method: Method,
-    newton: Newton,
+    newton: NewtonVariant,
     linear: LinearSolver,
     /// What the paper reports for 128 steps at n = 256 and 512, in seconds: hybrid on one A100, finite elements (sparse direct
     /// solver) on 64 cores.
@@ -175,7 +175,7 @@ fn program(options: &Options) -> Result<()> {
     let budget = if quick { 0.1 } else { options.budget };
     let networks = timing::networks(&options.networks, cells)?;
     let checksum = |&n| {
-        let found = networks.find(Scheme::Paper, &convergence_network(n)?)?;
+        let found = networks.find(Formulation::Paper, &convergence_network(n)?)?;
         Ok((format!("n{n}"), found.network.fingerprint().into()))
     };
     let checksums = cells.iter().map(checksum);
@@ -193,16 +193,17 @@ fn program(options: &Options) -> Result<()> {
         timings.extend(measure(&mut session, &networks, n, budget)?);
     }
     // One step of tau = 2^-18 of the armadillo by the hybrid scheme and nested finite elements, eps = 2h, tautilde = h^2.
-    let time = (StepRule::Constant(0.5_f64.powi(18)), 1);
+    let rule = StepRule::Constant(0.5_f64.powi(18));
     let (scales, needed) = (surfaces::scales(n), surfaces::needed_network());
     let steps = session.phase("armadillo", |stage| {
         let initial = mesh.phase_field(grid, scales.eps, &stage.bar)?;
         let mut steps = Vec::new();
         for (method, papers_seconds) in [(Hybrid, 807.0), (FeImplicit, 14589.0)] {
-            let (variant, source) = ((method, Scheme::Paper), networks.of(Scheme::Paper));
-            let operator = Operator::new(variant, &source, &needed, &grid, &scales)?;
-            let initial = initial.clone();
-            let run = stage.run(Case::willmore(&mesh.title, initial, operator, scales, time))?;
+            let discretization = Discretization::new(method, Formulation::Paper);
+            let source = networks.of(Formulation::Paper);
+            let operator = Operator::new(discretization, &source, &needed, &grid, &scales)?;
+            let (title, initial) = (&mesh.title, initial.clone());
+            let run = stage.run(Case::willmore(title, initial, operator, scales, rule, 1))?;
             let papers_seconds = (mesh.is_papers && !quick).then_some(papers_seconds);
             steps.push((method, timing::numbers(&run, stage.device), papers_seconds));
         }
@@ -226,9 +227,9 @@ fn program(options: &Options) -> Result<()> {
         .text("surface", |_| &mesh.title)
         .text("method", |(method, ..)| method.label())
         .column("n", Shortest, |_| n)
-        .measure("seconds", ("one step [s]", Fixed(2)), |s| s.1["seconds"])
+        .measure("seconds", "one step [s]", Fixed(2), |s| s.1["seconds"])
         .column("Newton", Fixed(0), |s| s.1["newton_per_step"])
-        .measure("hvp", ("HVP", Fixed(0)), |s| s.1["hvp_on_this_grid"])
+        .measure("hvp", "HVP", Fixed(0), |s| s.1["hvp_on_this_grid"])
         .column(PAPERS, Shortest, |s| s.2);
     session.sheet(steps, "armadillo")?;
     let json = timings.iter().map(|t| {
@@ -253,12 +254,13 @@ fn program(options: &Options) -> Result<()> {
 fn measure(session: &mut Session, networks: &Chosen, n: usize, budget: f64) -> Result<Vec<Timing>> {
     let mut contenders = Vec::new();
     for row in &VARIANTS {
-        let mut operator = networks.operator((row.method, Scheme::Paper), n)?;
+        let mut operator =
+            networks.operator(Discretization::new(row.method, Formulation::Paper), n)?;
         // All begin their steps on the whole grid, as in the paper.
         operator.half_grids = false;
         operator.linear = row.linear;
         let mut case = timing::plane(&operator, n, STEPS, session.options.quick)?;
-        case.scales.newton.method = row.newton;
+        case.scales.newton.variant = row.newton;
         contenders.push(Timing {
             row,
             n,

@@ -206,7 +206,8 @@ impl Trainings {
             bar.set_position(checkpoint.curve.len() as u64);
             bar.reset_eta();
             let mut stored = Instant::now();
-            let mut observer = |at: &training::Progress, checkpoint: &Checkpoint<R::State>| {
+            let mut observer = |at: &training::TrainingProgress,
+                                checkpoint: &Checkpoint<R::State>| {
                 bar.set_length(at.of as u64);
                 bar.set_position(at.iteration as u64);
                 bar.set_message(format!("{}  {:.2e}", spec.name, at.held_out_loss));

@@ -246,9 +246,9 @@ impl Segmented {
 
 impl Row<'_> {
     fn picture(&self) -> Result<Raster> {
-        let frame = (self.of.up, self.of.marched.bounding_box());
+        let (up, frame) = (self.of.up, self.of.marched.bounding_box());
         let change = report::signed(&format!("{:+.2}", self.numbers["volume"]));
         let caption = format!("{}\nvolume {change} %", self.treatment.1);
-        mesh_raster(&self.surface, frame, caption)
+        mesh_raster(&self.surface, up, frame, caption)
     }
 }

@@ -128,8 +128,8 @@ fn program(options: &Options) -> Result<()> {
                 Some(relaxed) if k > 0 => relaxed.field.clone(),
                 _ => equilibrium.start(setting.grid, setting.scales.eps, 0.5)?,
             };
-            let flow = (setting.operator(ACCURATE)?, setting.scales);
-            all.push(equilibrium.relax(&mut session, (name, initial), flow, steps)?);
+            let (operator, scales) = (setting.operator(ACCURATE)?, setting.scales);
+            all.push(equilibrium.relax(&mut session, name, initial, operator, scales, steps)?);
         }
     }
     session.sheet(equilibria::sheet(&all), "energies")?;

@@ -1,7 +1,8 @@
 use crate::circles::{self, Ensemble};
 use crate::prelude::*;
 use crate::truth::{
-    self, CELLS, CROSS, ELLIPSE, ELLIPSOID, RECTANGLE, Reached, STRICT, Sample, Truth,
+    self, CELLS, CROSS, Course, ELLIPSE, ELLIPSOID, Halves, RECTANGLE, Reached, STRICT, Sample,
+    Truth,
 };
 
 pub const EXPERIMENT: Experiment = Experiment {
@@ -109,9 +110,11 @@ const SURFACE: Sample<3> = ELLIPSOID;
 
 /// Times at which flows are compared, in units of `2^-14`.
 const MARKS: [usize; 4] = [8, 32, 64, 128];
-const END: f64 = 128.0 * STEP;
 /// The first mark is the end divided by two so many times.
-const HALVINGS: u32 = 4;
+const HALVES: Halves = Halves {
+    end: 128.0 * STEP,
+    halvings: 4,
+};
 
 const EULER: &str = "implicit Euler, equal steps";
 const GRADED: &str = "implicit Euler, graded steps";
@@ -163,7 +166,7 @@ fn steppings(longest: f64, quick: bool) -> Vec<Stepping> {
         };
         add(EQUAL, key("second_order", 0.5 * halved), steps);
         let (suffix, control) = controls[k];
-        let steps = truth::controlled(control, (END, HALVINGS));
+        let steps = truth::controlled(control, HALVES);
         add(CONTROLLED, format!("controlled{suffix}"), steps);
         let longer = 0.125 * halved;
         add(NESTED, key("elements", longer), equal(longer));
@@ -198,14 +201,21 @@ fn program(Options { run: options }: &Options) -> Result<()> {
     let times: Vec<(usize, f64)> = marks.iter().map(|&k| (k, time(k))).collect();
     let in_plane = steppings(STEP, options.quick);
     for sample in &CURVES {
-        let at = (cells, &times[..]);
-        rows.extend(compare(&mut session, sample, at, &in_plane, &mut ratios)?);
+        let (session, ratios) = (&mut session, &mut ratios);
+        rows.extend(compare(session, sample, cells, &times, &in_plane, ratios)?);
     }
     let halves: Vec<usize> = cells.iter().map(|n| n / 2).collect();
     let mut in_space = steppings(4.0 * STEP, options.quick);
     in_space.retain(|stepping| stepping.kind != NESTED);
-    let at = (&halves[..], &times[..]);
-    rows.extend(compare(&mut session, &SURFACE, at, &in_space, &mut ratios)?);
+    let surface = compare(
+        &mut session,
+        &SURFACE,
+        &halves,
+        &times,
+        &in_space,
+        &mut ratios,
+    );
+    rows.extend(surface?);
     if !ratios.is_empty() {
         // The least ratio of an estimated time error to the true one, and in which part of the cases it is between 1/3 and 3.
         let is_good = |ratio: &&f64| (1.0 / 3.0..=3.0).contains(*ratio);
@@ -230,7 +240,8 @@ fn program(Options { run: options }: &Options) -> Result<()> {
 fn compare<'a, const D: usize>(
     session: &mut Session,
     sample: &Sample<D>,
-    (cells, marks): (&[usize], &[(usize, f64)]),
+    cells: &[usize],
+    marks: &[(usize, f64)],
     steppings: &'a [Stepping],
     ratios: &mut Vec<f64>,
 ) -> Result<Vec<Compared<'a>>> {
@@ -241,12 +252,16 @@ fn compare<'a, const D: usize>(
     for &n in cells {
         let mut controlled = Vec::new();
         for stepping in steppings {
-            let variant = match stepping.kind {
+            let discretization = match stepping.kind {
                 NESTED => ELEMENTS,
                 _ => ACCURATE,
             };
-            let steps = (&stepping.key[..], stepping.steps, marks[marks.len() - 1].1);
-            let run = sample.run(session, (n, 2.0), variant, steps)?;
+            let course = Course {
+                name: &stepping.key,
+                steps: stepping.steps,
+                end: marks[marks.len() - 1].1,
+            };
+            let run = sample.run(session, n, 2.0, discretization, course)?;
             let own = (stepping.kind == GRADED).then(|| {
                 let end = |&(mark, time): &(usize, f64)| (mark, truth::at(&run, time).time);
                 sample.exact(Flow::Willmore, &marks.iter().map(end).collect::<Vec<_>>())
@@ -268,7 +283,7 @@ fn compare<'a, const D: usize>(
     }
     if cells.len() > 1 {
         let exact: Vec<&Truth> = exact.iter().collect();
-        sample.extrapolated(session, (END, HALVINGS), &exact)?;
+        sample.extrapolated(session, HALVES, &exact)?;
     }
     Ok(rows)
 }
@@ -311,8 +326,9 @@ fn circles(session: &mut Session) -> Result<()> {
     let variant = Variant::new(Flow::Willmore, ACCURATE, CELLS[1]);
     let (flow, end) = (variant.flow, time(steps));
     let operator = Chosen::default().operator(ACCURATE, variant.n)?;
+    let planned = Planned { variant, operator };
     let euler = session.phase("circles: euler1", |stage| {
-        Ensemble::run(&(variant, operator), (count, steps), "fields", stage)
+        Ensemble::run(&planned, count, steps, "fields", stage)
     })?;
     let hvp = |run: &Trajectory<2>| total_hvp(&run.records);
     let work = euler.circles.iter().map(|circle| hvp(&circle.trajectory));
@@ -321,9 +337,12 @@ fn circles(session: &mut Session) -> Result<()> {
         let mut run = |n: usize, name: &str, control| {
             let grid = circles::grid(flow, radius, steps, n)?;
             let initial = phase_field(grid, &Ball::new([0.0; 2], radius)?, 2.0 * grid.spacing())?;
-            let name = format!("circle{k:02}-n{n}-{name}");
-            let time = (&name[..], TimeSteps::controlled(control), end);
-            let run = truth::flow(session, ("circle", initial, 2.0), ACCURATE, time)?;
+            let course = Course {
+                name: &format!("circle{k:02}-n{n}-{name}"),
+                steps: TimeSteps::controlled(control),
+                end,
+            };
+            let run = truth::flow(session, "circle", initial, 2.0, ACCURATE, course)?;
             Ok::<_, Error>((run.field(run.steps())?, hvp(&run)))
         };
         let [coarse, fine] = CELLS;

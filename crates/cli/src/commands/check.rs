@@ -30,9 +30,9 @@ struct Finding {
 
 /// Checks the derivatives of the energy at the input.
 pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
-    options.scheme.fill_in()?;
+    options.operator.fill_in()?;
     let device = options.common.open_device()?;
-    let eps_over_h = options.scheme.eps_over_h();
+    let eps_over_h = options.operator.eps_over_h();
     let findings = match Reader::of(&mut options.input, eps_over_h, messages)?.load()? {
         Loaded::Plane(start) => findings(&start.initial.field()?, &options, &device)?,
         Loaded::Space(start) => findings(&start.initial.field()?, &options, &device)?,
@@ -59,7 +59,7 @@ fn findings<const D: usize>(
     options: &CheckOptions,
     device: &ComputeDevice,
 ) -> Result<Vec<Finding>> {
-    let (scales, operator) = options.scheme.operator(Method::Hybrid, field.grid())?;
+    let (scales, operator) = options.operator.on_grid(Method::Hybrid, field.grid())?;
     let network = operator.network();
     let network = &network.expect("a learned operator has one").network;
     let params = FlowParams::paper(scales.eps, scales.mcf_step);

@@ -5,7 +5,7 @@ use engine::{Flow, Storage, Store};
 use crate::case::with_round_edges;
 use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
 use crate::config;
-use crate::input::{Loaded, Reader, Start};
+use crate::input::{InitialShape, Loaded, Reader};
 use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
@@ -23,7 +23,9 @@ impl RunCommand {
             Self::Fair(fair) => fair.check()?,
             Self::Inpaint(inpaint) => inpaint.check()?,
             Self::Mcf(McfOptions { method, run }) => {
-                let chosen = run.scheme.network.is_some() || run.scheme.scheme != Scheme::Accurate;
+                let options = &run.operator;
+                let chosen =
+                    options.network.is_some() || options.formulation != Formulation::Accurate;
                 if chosen && !method.is_learned() {
                     refuse!(
                         "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
@@ -56,8 +58,8 @@ impl RunCommand {
 impl RunOptions {
     /// Reads the input, for Willmore flow on a device.
     pub fn reader(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Reader<'_>> {
-        let mut reader = Reader::of(&mut self.input, self.scheme.eps_over_h(), messages)?;
-        let is_dense = self.scheme.storage == Some(Storage::Dense);
+        let mut reader = Reader::of(&mut self.input, self.operator.eps_over_h(), messages)?;
+        let is_dense = self.operator.storage == Some(Storage::Dense);
         reader.whole = is_dense.then_some((device, Flow::Willmore));
         Ok(reader)
     }
@@ -98,7 +100,7 @@ pub fn run(
         let steps = more.or(noted.map(|steps| steps as usize));
         options.steps = steps.or(options.steps);
     }
-    options.scheme.fill_in()?;
+    options.operator.fill_in()?;
     // That its folder is gone is no reason not to go on with a run.
     let is_gone = |save: &mut PathBuf| stored.is_some() && !save.parent().is_some_and(Path::is_dir);
     if let Some(save) = options.save.take_if(is_gone) {
@@ -147,7 +149,10 @@ struct Job {
 }
 
 impl Job {
-    fn start<const D: usize, O: Presentation<D>>(mut self, mut start: Start<D, O>) -> Result<()> {
+    fn start<const D: usize, O: Presentation<D>>(
+        mut self,
+        mut start: InitialShape<D, O>,
+    ) -> Result<()> {
         let options = self.command.options();
         start.presentation.turn(&mut options.up)?;
         options.save.as_deref().map_or(Ok(()), O::check_saved)?;
@@ -199,7 +204,7 @@ impl Job {
         })?;
         let (initial, region) = engine::initial(&stored)?;
         presentation.restore(&stored)?;
-        let (case, presentation) = self.command.case(Start {
+        let (case, presentation) = self.command.case(InitialShape {
             name,
             initial,
             presentation,
@@ -213,9 +218,8 @@ impl Job {
                 if stored.is_finished() {
                     notes["was_over"] = true.into();
                 }
-                let with = (checkpoints, notes);
                 let ends = |name: &str| presentation::is_of_end(name, plan.extension());
-                Store::extend(stored, case, &self.device, with, ends)?
+                Store::extend(stored, case, &self.device, checkpoints, notes, ends)?
             }
             None => Store::resume(stored, case, &self.device, checkpoints)?,
         };

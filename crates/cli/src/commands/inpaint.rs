@@ -1,5 +1,5 @@
 use crate::cli::{InpaintOptions, MessageOptions};
-use crate::input::{Loaded, Start};
+use crate::input::{InitialShape, Loaded};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
@@ -36,9 +36,9 @@ impl InpaintOptions {
     /// Lets only the nodes inside a mask move, where the shape is what the ansatz says.
     fn restricted<const D: usize, O>(
         &self,
-        mut start: Start<D, O>,
+        mut start: InitialShape<D, O>,
         mask: &dyn SignedDistance<D>,
-    ) -> Result<Start<D, O>> {
+    ) -> Result<InitialShape<D, O>> {
         let mut field = start.initial.field()?;
         let grid = *field.grid();
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
@@ -51,7 +51,7 @@ impl InpaintOptions {
                 grid.side()
             );
         }
-        let eps = self.flow.run.scheme.eps_over_h() * grid.spacing();
+        let eps = self.flow.run.operator.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
             Ansatz::Keep => field.clone(),
             Ansatz::Empty => Field::constant(grid, -1.0),

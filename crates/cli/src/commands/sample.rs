@@ -1,7 +1,7 @@
 use volumes::Volume;
 
 use crate::cli::{MessageOptions, SampleOptions};
-use crate::input::{Loaded, Reader, Source, Start, check_phases, closed};
+use crate::input::{InitialShape, Loaded, Reader, Source, check_phases, closed};
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -83,7 +83,7 @@ fn eps<const D: usize>(u: &Field<D>) -> f64 {
 }
 
 fn write<const D: usize, O: Presentation<D>>(
-    mut start: Start<D, O>,
+    mut start: InitialShape<D, O>,
     mut options: SampleOptions,
     path: &Path,
 ) -> Result<()> {

@@ -1,7 +1,7 @@
 use engine::quarter_square;
 use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
-use model::training::{Checkpoint, Progress, SphereData, Training};
+use model::training::{Checkpoint, SphereData, Training, TrainingProgress};
 
 use crate::case::check_eps_over_h;
 use crate::cli::{MessageOptions, TrainOptions};
@@ -44,7 +44,7 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     let interrupt = Interrupt::catch()?;
     let progress = messages.progress();
     let bar = progress.bar("training", 1);
-    let mut observer = |at: &Progress, _: &Checkpoint<()>| {
+    let mut observer = |at: &TrainingProgress, _: &Checkpoint<()>| {
         bar.set_length(at.of as u64);
         bar.set_position(at.iteration as u64);
         Ok(!interrupt.requested())

@@ -1,6 +1,9 @@
 //! Small cases.
 
-use engine::{Case, Flow, Measure, Method, Operator, Run, Scales, Scheme, StepRule, TimeSteps};
+use engine::{
+    Case, Discretization, Flow, Formulation, Measure, Method, Operator, Run, Scales, StepRule,
+    TimeSteps,
+};
 use geometry::shapes::{Ball, Cuboid};
 use geometry::{Field, Grid, phase_field};
 use model::Networks;
@@ -36,12 +39,12 @@ pub fn square(n: usize) -> Field<2> {
     phase_field(grid(n), &Cuboid::new([0.2; 2]).unwrap(), EPS).unwrap()
 }
 
-/// A flow of this phase field by a method of the paper's scheme.
+/// A flow of this phase field by a method in the paper's formulation.
 pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
     let grid = *initial.grid();
     let needed = scales().needs(2, grid.spacing());
     let operator = Operator::new(
-        (method, Scheme::Paper),
+        Discretization::new(method, Formulation::Paper),
         &Networks::default(),
         &needed,
         &grid,
@@ -49,11 +52,11 @@ pub fn case(flow: Flow, method: Method, initial: Field<2>) -> Case<2> {
     );
     let mut measures = Measure::size(EPS);
     measures.extend(Measure::crossings(0.0));
-    let steps = (StepRule::Constant(TAU), 4);
+    let steps = StepRule::Constant(TAU);
     Case {
         flow,
         measures,
-        ..Case::willmore("shape", initial, operator.unwrap(), scales(), steps)
+        ..Case::willmore("shape", initial, operator.unwrap(), scales(), steps, 4)
     }
 }
 

@@ -8,7 +8,7 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::{Observer, Progress, Recipe, SphereData};
+use super::{Recipe, SphereData, TrainingObserver, TrainingProgress};
 use crate::mlp::forward;
 use crate::{Error, Mlp, Network};
 
@@ -104,7 +104,7 @@ impl AdamParams {
         seed: u64,
         state: Option<AdamState>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, AdamState>,
+        observer: &mut TrainingObserver<'_, AdamState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         data.validate()?;
         if self.batch == 0 || self.epochs == 0 {
@@ -200,7 +200,7 @@ impl AdamParams {
                 held_spheres.clone(),
                 held_targets.clone(),
             );
-            let progress = Progress {
+            let progress = TrainingProgress {
                 iteration: state.epoch,
                 of: self.epochs,
                 training_loss: sum / batches,
@@ -223,7 +223,7 @@ impl Recipe for AdamParams {
         seed: u64,
         state: Option<AdamState>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, AdamState>,
+        observer: &mut TrainingObserver<'_, AdamState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         if data.ratios.dimension == 2 {
             self.train_in::<2, 3>(data, seed, state, device, observer)

@@ -5,7 +5,7 @@ use operators::ComputeDevice;
 use serde::{Deserialize, Serialize};
 
 use super::levenberg_marquardt::{Problem, best_start};
-use super::{BandSamples, Observer, Progress};
+use super::{BandSamples, TrainingObserver, TrainingProgress};
 use crate::{Error, Mlp, PAPER_LAYERS};
 
 /// Settings of the fit of a perceptron to a function.
@@ -45,7 +45,7 @@ pub(super) fn distill_odd(
     settings: &Distillation,
     seed: u64,
     device: &ComputeDevice,
-    observer: &mut Observer<'_, ()>,
+    observer: &mut TrainingObserver<'_, ()>,
 ) -> Result<Mlp, Error> {
     let nodes: Vec<f64> = (0..IMITATED).map(|i| i as f64 * NODE_DISTANCE).collect();
     let design: Vec<f64> = nodes
@@ -70,7 +70,7 @@ pub(super) fn distill_odd(
         problem.fit_activation(x, iterations, |all| {
             iteration += 1;
             let (loss, _) = problem.value(all)?;
-            let progress = Progress {
+            let progress = TrainingProgress {
                 iteration,
                 of,
                 training_loss: loss,

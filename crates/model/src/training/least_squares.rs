@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::distillation::{Distillation, distill_odd};
 use super::levenberg_marquardt::heat_kernel;
 use super::spheres::{BAND, direction, norm};
-use super::{Observer, Recipe, SphereData};
+use super::{Recipe, SphereData, TrainingObserver};
 use crate::ratios::offsets;
 use crate::{Error, Mlp, Ratios};
 
@@ -347,7 +347,7 @@ impl Recipe for LeastSquaresParams {
         seed: u64,
         _: Option<()>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, ()>,
+        observer: &mut TrainingObserver<'_, ()>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         let kernel = kernel_of_full_variance(data)?;
         let polynomial = fit(data, self, &kernel, seed)?;

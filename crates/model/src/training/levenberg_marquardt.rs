@@ -13,7 +13,7 @@ use operators::ComputeDevice;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::{BandSamples, Observer, Orbits, Progress, Recipe, SphereData};
+use super::{BandSamples, Orbits, Recipe, SphereData, TrainingObserver, TrainingProgress};
 use crate::mlp::{forward, forward_with, layout, parameter_count};
 use crate::ratios::offsets;
 use crate::{Error, Mlp, PAPER_LAYERS, Ratios};
@@ -107,7 +107,8 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         samples: &BandSamples,
         sizes: &[usize],
-        (ridge, centre): (Vec<f64>, Vec<f64>),
+        ridge: Vec<f64>,
+        centre: Vec<f64>,
         device: &'a ComputeDevice,
     ) -> Self {
         let (rows, orbits) = (samples.target.len(), sizes.len());
@@ -138,7 +139,7 @@ impl<'a> Problem<'a> {
         // One "orbit" whose value is frozen at 1 by an overwhelming ridge.
         let (mut weights, mut centre) = (vec![ridge; n + 1], vec![0.0; n + 1]);
         (weights[0], centre[0]) = (1e12, 1.0);
-        Self::new(samples, &[1], (weights, centre), device)
+        Self::new(samples, &[1], weights, centre, device)
     }
 
     /// Loss and parameters after so many steps from `x`, fewer if none lowers the value; `observe` is told the parameters, the first one being
@@ -479,7 +480,7 @@ impl Recipe for LmParams {
         seed: u64,
         state: Option<LmState>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, LmState>,
+        observer: &mut TrainingObserver<'_, LmState>,
     ) -> Result<(Vec<f64>, Mlp), Error> {
         data.validate()?;
         let orbits = Orbits::new(data.ratios.dimension, data.ratios.width);
@@ -501,9 +502,9 @@ impl Recipe for LmParams {
         let scale = training.identity_loss;
         let held_scale = held_out.identity_loss;
         let sizes = &orbits.sizes;
-        let no_ridge = (vec![0.0; ridge.len()], centre.clone());
-        let held_out = Problem::new(&held_out, sizes, no_ridge, device);
-        let problem = Problem::new(&training, sizes, (ridge, centre), device);
+        let no_ridge = vec![0.0; ridge.len()];
+        let held_out = Problem::new(&held_out, sizes, no_ridge, centre.clone(), device);
+        let problem = Problem::new(&training, sizes, ridge, centre, device);
         drop(training);
 
         let mut state = match state {
@@ -538,7 +539,7 @@ impl Recipe for LmParams {
                 state.improved_to = held;
                 state.improved_at = state.iteration;
             }
-            let progress = Progress {
+            let progress = TrainingProgress {
                 iteration: state.iteration,
                 of: self.iterations,
                 training_loss: loss * scale,
@@ -591,7 +592,7 @@ mod tests {
         let x = [heat, random_activation(&mut rng)].concat();
         let centre = x.iter().map(|x| 0.9 * x).collect();
         let ridge = vec![1e-2; x.len()];
-        let problem = Problem::new(&samples, &orbits.sizes, (ridge, centre), device);
+        let problem = Problem::new(&samples, &orbits.sizes, ridge, centre, device);
         (problem, x)
     }
 

@@ -23,7 +23,7 @@ use crate::Error;
 
 /// The progress of a training after an iteration or epoch, for displays and learning curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
+pub struct TrainingProgress {
     /// Number of finished iterations.
     pub iteration: usize,
     /// Number of planned iterations.
@@ -34,9 +34,13 @@ pub struct Progress {
     pub held_out_loss: f64,
 }
 
-impl Progress {
+impl TrainingProgress {
     /// Tells an observer, who may end the training.
-    fn tell<State>(&self, observer: &mut Observer<'_, State>, state: &State) -> Result<(), Error> {
+    fn tell<State>(
+        &self,
+        observer: &mut TrainingObserver<'_, State>,
+        state: &State,
+    ) -> Result<(), Error> {
         if observer(self, state)? {
             return Ok(());
         }
@@ -48,7 +52,8 @@ impl Progress {
 
 /// Called after every iteration of a training: `Ok(false)` stops it with [`Error::Interrupted`], and an error, such as that of storing
 /// a checkpoint, ends it.
-pub type Observer<'a, State> = dyn FnMut(&Progress, &State) -> Result<bool, Error> + Send + 'a;
+pub type TrainingObserver<'a, State> =
+    dyn FnMut(&TrainingProgress, &State) -> Result<bool, Error> + Send + 'a;
 
 #[cfg(test)]
 mod tests {
@@ -80,23 +85,23 @@ mod tests {
         R::State: PartialEq + Debug,
     {
         let device = ComputeDevice::default_compiled().unwrap();
-        let run = |state: Option<R::State>, observer: &mut Observer<'_, R::State>| {
+        let run = |state: Option<R::State>, observer: &mut TrainingObserver<'_, R::State>| {
             recipe.train(data, seed, state, &device, observer)
         };
         let (mut losses, mut last) = (Vec::new(), None);
-        let whole = run(None, &mut |p: &Progress, s: &R::State| {
+        let whole = run(None, &mut |p: &TrainingProgress, s: &R::State| {
             losses.push(p.held_out_loss);
             last = Some(s.clone());
             Ok(true)
         });
         let mut half = None;
-        let stopped = run(None, &mut |p: &Progress, s: &R::State| {
+        let stopped = run(None, &mut |p: &TrainingProgress, s: &R::State| {
             half = Some(s.clone());
             Ok(p.iteration < stop)
         });
         assert!(matches!(stopped, Err(Error::Interrupted { iteration }) if iteration == stop));
         let mut resumed_last = None;
-        let resumed = run(half, &mut |_: &Progress, s: &R::State| {
+        let resumed = run(half, &mut |_: &TrainingProgress, s: &R::State| {
             resumed_last = Some(s.clone());
             Ok(true)
         });

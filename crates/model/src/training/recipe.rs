@@ -7,7 +7,7 @@ use operators::{ComputeDevice, memory};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::{Observer, Progress, SphereData};
+use super::{SphereData, TrainingObserver, TrainingProgress};
 use crate::{Error, Mlp, Network, Provenance, Quality};
 
 /// A method of training with its settings.
@@ -29,7 +29,7 @@ pub trait Recipe: Serialize + Sync {
         seed: u64,
         state: Option<Self::State>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, Self::State>,
+        observer: &mut TrainingObserver<'_, Self::State>,
     ) -> Result<(Vec<f64>, Mlp), Error>;
 
     /// Method and settings in words, after so many iterations.
@@ -108,7 +108,7 @@ impl<R: Recipe> Training<'_, R> {
         &self,
         checkpoint: &mut Checkpoint<R::State>,
         device: &ComputeDevice,
-        observer: &mut Observer<'_, Checkpoint<R::State>>,
+        observer: &mut TrainingObserver<'_, Checkpoint<R::State>>,
     ) -> Result<Trained, Error> {
         self.check(device)?;
         let state = checkpoint.state.clone().filter(|_| R::GOES_ON);
@@ -117,7 +117,7 @@ impl<R: Recipe> Training<'_, R> {
         }
         let before = checkpoint.curve.last().map_or(0.0, |point| point.seconds);
         let clock = Instant::now();
-        let mut record = |progress: &Progress, state: &R::State| {
+        let mut record = |progress: &TrainingProgress, state: &R::State| {
             checkpoint.state = Some(state.clone());
             checkpoint.curve.push(CurvePoint {
                 iteration: progress.iteration,
@@ -203,7 +203,7 @@ mod tests {
         let found = training.run(
             &mut Checkpoint::default(),
             &device,
-            &mut |_: &Progress, _: &_| Ok(false),
+            &mut |_: &TrainingProgress, _: &_| Ok(false),
         );
         assert!(matches!(found, Err(Error::Training(reason)) if reason.contains("held-out")));
     }
@@ -219,9 +219,11 @@ mod tests {
         };
         let mut checkpoint = Checkpoint::default();
         for _ in 0..2 {
-            let stopped = training.run(&mut checkpoint, &device, &mut |p: &Progress, _: &_| {
-                Ok(p.iteration < 2)
-            });
+            let stopped = training.run(
+                &mut checkpoint,
+                &device,
+                &mut |p: &TrainingProgress, _: &_| Ok(p.iteration < 2),
+            );
             assert!(matches!(stopped, Err(Error::Interrupted { iteration: 2 })));
             assert_eq!(checkpoint.curve.len(), 2);
         }
@@ -238,7 +240,7 @@ mod tests {
             held_out: 2,
         };
         let run = |checkpoint: &mut Checkpoint<LmState>, last: usize| {
-            training.run(checkpoint, &device, &mut |p: &Progress, _: &_| {
+            training.run(checkpoint, &device, &mut |p: &TrainingProgress, _: &_| {
                 Ok(p.iteration < last)
             })
         };

@@ -9,7 +9,7 @@ use burn_backend::TensorMetadata;
 use burn_backend::cubecl::dtype_to_storage_type;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
-use linearize::{Arithmetic, Elementwise, Output, Right};
+use linearize::{Arithmetic, Elementwise, Instruction, Output, Right};
 
 use super::launch::{like, threads_for, values};
 
@@ -36,8 +36,8 @@ impl Form {
     /// That of a program, and its numbers.
     fn of(program: &Elementwise, single: Vec<bool>) -> (Self, Vec<f64>) {
         let mut numbers = Vec::new();
-        let step = |&(arithmetic, left, right): &(Arithmetic, usize, Right)| {
-            let (by_number, right) = match right {
+        let step = |instruction: &Instruction| {
+            let (by_number, right) = match instruction.right {
                 Right::Operand(operand) => (false, operand),
                 Right::Number(number) => {
                     numbers.push(number);
@@ -45,8 +45,8 @@ impl Form {
                 }
             };
             Step {
-                arithmetic,
-                left,
+                arithmetic: instruction.arithmetic,
+                left: instruction.left,
                 right,
                 by_number,
             }

@@ -28,18 +28,20 @@ pub(crate) fn transform(
     let mut divisors = (1..=n.isqrt()).rev().filter(|a| n.is_multiple_of(*a));
     let a = divisors.next().unwrap_or(1);
     if a == 1 {
-        return sums((re, im), roots, axis, (1, n), false, inverse);
+        return sums(re, im, roots, axis, [1, n], false, inverse);
     }
-    let (re, im) = sums((re, im), roots, axis, (a, n / a), true, inverse);
-    sums((re, Some(im)), roots, axis, (a, n / a), false, inverse)
+    let factors = [a, n / a];
+    let (re, im) = sums(re, im, roots, axis, factors, true, inverse);
+    sums(re, Some(im), roots, axis, factors, false, inverse)
 }
 
 /// The inner sums, in the order `(p, j)`, or the outer ones.
 fn sums(
-    (re, im): (CubeTensor, Option<CubeTensor>),
+    re: CubeTensor,
+    im: Option<CubeTensor>,
     roots: &CubeTensor,
     axis: usize,
-    (a, b): (usize, usize),
+    [a, b]: [usize; 2],
     inner: bool,
     inverse: bool,
 ) -> Parts {

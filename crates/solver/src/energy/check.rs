@@ -109,7 +109,7 @@ pub(crate) fn fits<const D: usize>(
         }
     }
     let mut alone = Alone::new(term, on, extensions)?;
-    let [negative, positive] = on.phase_values().map(|value| on.sample(|_| value));
+    let [negative, positive] = [-1.0, 1.0].map(|value| on.sample(|_| value));
     for (u, place) in [
         (profile, "on a flat interface"),
         (negative, "in the pure phase outside"),

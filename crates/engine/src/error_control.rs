@@ -47,7 +47,7 @@ const LEAST: f64 = 0.1;
 
 /// The size of the next controlled step. It depends on nothing but the records so far.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sizes {
+pub(crate) struct ControlledSteps {
     control: ErrorControl,
     eps: f64,
     largest: f64,
@@ -55,7 +55,7 @@ pub(crate) struct Sizes {
     time: f64,
 }
 
-impl Sizes {
+impl ControlledSteps {
     pub(crate) fn new(control: ErrorControl, eps: f64, largest: f64) -> Result<Self, Error> {
         let size = control.first.unwrap_or(16.0 * eps.powi(4));
         positive("relative error of a step", control.relative)?;
@@ -80,9 +80,9 @@ impl Sizes {
         }
     }
 
-    /// By which factors a step of size `tau` could have been longer: for its error, which is of third order and counts against what is allowed, of first
-    /// order, and for its displacement.
-    fn room(&self, estimates: &StepEstimates, (tau, end): (f64, f64)) -> (f64, f64) {
+    /// By which factors a step of size `tau` that ends at the time `end` could have been longer: for its error, which is of third order and counts
+    /// against what is allowed, of first order, and for its displacement.
+    fn room(&self, estimates: &StepEstimates, tau: f64, end: f64) -> (f64, f64) {
         let allowed = match self.control.length {
             Some(length) => length / ESTIMATES_MISS * tau / end,
             None => self.control.relative * estimates.motion,
@@ -99,7 +99,7 @@ impl Sizes {
     /// The size with which a step is made again, if it was too long.
     pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
         let estimates = made.estimates?;
-        let (by_error, by_displacement) = self.room(&estimates, (made.tau, made.time));
+        let (by_error, by_displacement) = self.room(&estimates, made.tau, made.time);
         let least = LEAST * self.time;
         let too_far = WORSE * by_displacement < AIM;
         let too_wrong = WORSE * by_error * by_error < 1.0 && made.tau > 1.2 * least;
@@ -116,7 +116,7 @@ impl Sizes {
         let Some(estimates) = record.minimization.and_then(|made| made.estimates) else {
             return;
         };
-        let (by_error, by_displacement) = self.room(&estimates, (made, record.time));
+        let (by_error, by_displacement) = self.room(&estimates, made, record.time);
         let by_error = (AIM * by_error).max(LEAST * self.time / made);
         let growth = by_error.min(AIM * by_displacement).clamp(0.3, GROWTH);
         // A step that was cut short to end at a given time says little about the next one.
@@ -141,8 +141,8 @@ mod tests {
 
     const EPS: f64 = 0.1;
 
-    fn controller() -> Sizes {
-        Sizes::new(ErrorControl::default(), EPS, 1.0).unwrap()
+    fn controlled() -> ControlledSteps {
+        ControlledSteps::new(ErrorControl::default(), EPS, 1.0).unwrap()
     }
 
     fn made(tau: f64, error: Option<f64>, displacement: f64) -> Record {
@@ -160,18 +160,15 @@ mod tests {
 
     #[test]
     fn the_error_of_the_next_step_is_what_it_may_be() {
-        let mut control = controller();
-        assert!((control.size(1.0) - 16.0 * EPS.powi(4)).abs() < 1e-18);
+        let mut steps = controlled();
+        assert!((steps.size(1.0) - 16.0 * EPS.powi(4)).abs() < 1e-18);
         // An error four times smaller than it may be allows twice the size, but for caution.
-        control.accept(&made(1e-3, Some(0.25 * 0.015 * 0.1), 0.01 * EPS));
-        assert!((control.size(1.0) / (2.0 * AIM * 1e-3) - 1.0).abs() < 1e-12);
-        control.accept(&made(1e-3, Some(1e-12), 0.01 * EPS));
-        assert!(
-            (control.size(1.0) - 2e-3).abs() < 1e-12,
-            "growth is limited"
-        );
-        control.accept(&made(2e-3, Some(1e-12), EPS));
-        assert!((control.size(1.0) - AIM * 2e-3).abs() < 1e-12);
+        steps.accept(&made(1e-3, Some(0.25 * 0.015 * 0.1), 0.01 * EPS));
+        assert!((steps.size(1.0) / (2.0 * AIM * 1e-3) - 1.0).abs() < 1e-12);
+        steps.accept(&made(1e-3, Some(1e-12), 0.01 * EPS));
+        assert!((steps.size(1.0) - 2e-3).abs() < 1e-12, "growth is limited");
+        steps.accept(&made(2e-3, Some(1e-12), EPS));
+        assert!((steps.size(1.0) - AIM * 2e-3).abs() < 1e-12);
     }
 
     #[test]
@@ -180,39 +177,39 @@ mod tests {
             length: Some(1e-4),
             ..ErrorControl::default()
         };
-        let mut control = Sizes::new(control, EPS, 1.0).unwrap();
+        let mut steps = ControlledSteps::new(control, EPS, 1.0).unwrap();
         // The step is the last quarter of the time.
         let allowed = 0.25 * 1e-4 / ESTIMATES_MISS;
-        control.accept(&made(1e-3, Some(allowed), 0.01 * EPS));
-        assert!((control.size(1.0) / (AIM * 1e-3) - 1.0).abs() < 1e-12);
+        steps.accept(&made(1e-3, Some(allowed), 0.01 * EPS));
+        assert!((steps.size(1.0) / (AIM * 1e-3) - 1.0).abs() < 1e-12);
         let wrong = made(1e-2, Some(4.0 * allowed), 0.01 * EPS);
-        let shorter = control.shorter(&wrong.minimization.unwrap()).unwrap();
+        let shorter = steps.shorter(&wrong.minimization.unwrap()).unwrap();
         assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn what_is_too_long_is_made_again() {
-        let mut control = controller();
+        let mut steps = controlled();
         let long = |record: &Record| record.minimization.unwrap();
         let far = made(1e-3, None, 3.0 * EPS);
-        control.accept(&made(1e-3, None, 0.1 * EPS));
-        let shorter = control.shorter(&long(&far)).unwrap();
+        steps.accept(&made(1e-3, None, 0.1 * EPS));
+        let shorter = steps.shorter(&long(&far)).unwrap();
         assert!((shorter / (0.85 / 3.0 * 1e-3) - 1.0).abs() < 1e-12);
         let wrong = made(1e-2, Some(4.0 * 0.015 * 0.1), 0.1 * EPS);
-        let shorter = control.shorter(&long(&wrong)).unwrap();
+        let shorter = steps.shorter(&long(&wrong)).unwrap();
         assert!((shorter / (0.5 * 0.85 * 1e-2) - 1.0).abs() < 1e-12);
         let good = made(1e-3, Some(0.015 * 0.1), EPS);
-        assert_eq!(control.shorter(&long(&good)), None);
+        assert_eq!(steps.shorter(&long(&good)), None);
     }
 
     #[test]
     fn the_end_is_met_and_forgotten() {
-        let mut control = controller();
-        control.size = 1e-3;
-        assert!((control.size(1.5e-3) - 0.75e-3).abs() < 1e-18);
-        assert!((control.size(0.4e-3) - 0.4e-3).abs() < 1e-18);
-        control.accept(&made(0.1e-3, Some(0.015 * 0.1), 0.1 * EPS));
-        assert!(control.size(1.0) > 0.8e-3);
+        let mut steps = controlled();
+        steps.size = 1e-3;
+        assert!((steps.size(1.5e-3) - 0.75e-3).abs() < 1e-18);
+        assert!((steps.size(0.4e-3) - 0.4e-3).abs() < 1e-18);
+        steps.accept(&made(0.1e-3, Some(0.015 * 0.1), 0.1 * EPS));
+        assert!(steps.size(1.0) > 0.8e-3);
     }
 
     #[test]
@@ -222,7 +219,7 @@ mod tests {
                 relative,
                 ..ErrorControl::default()
             };
-            let error = Sizes::new(control, EPS, 1.0).unwrap_err();
+            let error = ControlledSteps::new(control, EPS, 1.0).unwrap_err();
             assert!(matches!(error, Error::Geometry(_)), "{error}");
         }
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// The operations that change a disk, one method each. They do what they say by default, so that a
 /// test overrides those which it wants to fail, count or record.
-pub trait Storage: fmt::Debug + Send + Sync {
+pub trait FileSystem: fmt::Debug + Send + Sync {
     /// Makes a folder in an existing one; it is an error if there is something of that name.
     fn create_folder(&self, path: &Path) -> io::Result<()> {
         fs::create_dir(path)
@@ -61,4 +61,4 @@ pub trait Storage: fmt::Debug + Send + Sync {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Disk;
 
-impl Storage for Disk {}
+impl FileSystem for Disk {}

@@ -7,11 +7,11 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// A stack of progress bars. Nothing is drawn when standard error is not a terminal or `quiet` is
 /// set, so logs stay clean; everything else works alike.
 #[derive(Debug, Clone)]
-pub struct Progress {
+pub struct ProgressBars {
     bars: MultiProgress,
 }
 
-impl Progress {
+impl ProgressBars {
     /// Progress bars on standard error if it is a terminal and not `quiet`.
     pub fn new(quiet: bool) -> Self {
         // It draws nothing where standard error is not a terminal.

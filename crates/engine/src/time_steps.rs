@@ -1,4 +1,4 @@
-//! Sizes of time steps.
+//! How the time of a flow is divided into steps.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! The loop over time steps.
+//! The loop over time steps until a stop rule holds, with observers and checkpoints.
 
 use runs::Interrupt;
 

@@ -15,9 +15,9 @@ const CACHED_SYSTEMS: usize = 2;
 /// A limit that no well-posed step comes near.
 const NEWTON_LIMIT: usize = 40;
 
-/// Which step of mean curvature flow.
+/// How a step of mean curvature flow treats the nonlinear term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum TimeDiscretization {
     Implicit,
     SemiImplicit,
 }
@@ -45,7 +45,7 @@ pub struct Statistics {
 /// - semi-implicit: `M (v - u) + tautilde S v + kappa M Psi'(u) = 0`, with `Psi'` interpolated at the nodes.
 ///
 /// All matrices are divided by `h^D`.
-pub struct Scheme<const D: usize> {
+pub struct FiniteElements<const D: usize> {
     cells: usize,
     /// `tautilde / h^2`.
     diffusion: f64,
@@ -73,8 +73,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl<const D: usize> Scheme<D> {
-    /// A scheme on a grid of `cells` per side and spacing `h`.
+impl<const D: usize> FiniteElements<D> {
+    /// Finite elements on a grid of `cells` per side and spacing `h`.
     ///
     /// # Errors
     /// [`Error::Geometry`] for fewer than 4 cells or scales that are not positive; [`Error::StepTooLarge`].
@@ -117,12 +117,18 @@ impl<const D: usize> Scheme<D> {
     }
 
     /// Symbols of `M`, and of the derivative `J` of the step in the pure phases.
-    pub(crate) fn phase_symbols(&self, kind: Kind, theta: &[f64]) -> (f64, f64) {
+    pub(crate) fn phase_symbols(
+        &self,
+        discretization: TimeDiscretization,
+        theta: &[f64],
+    ) -> (f64, f64) {
         let (mass, stiffness) = element::symbols(theta);
         let diffusion = self.diffusion * stiffness;
-        let derivative = match kind {
-            Kind::Implicit => mass / (mass * (1.0 + 2.0 * self.reaction) + diffusion),
-            Kind::SemiImplicit => mass * (1.0 - 2.0 * self.reaction) / (mass + diffusion),
+        let derivative = match discretization {
+            TimeDiscretization::Implicit => mass / (mass * (1.0 + 2.0 * self.reaction) + diffusion),
+            TimeDiscretization::SemiImplicit => {
+                mass * (1.0 - 2.0 * self.reaction) / (mass + diffusion)
+            }
         };
         (mass, derivative)
     }

@@ -5,47 +5,53 @@ use engine::Values;
 use crate::prelude::libraries::*;
 use crate::session::Session;
 
-/// A step of one of several runs, or its beginning, which has no record.
-pub struct Step<'a, R> {
+/// A row of the table: a step of one of several runs, or its beginning, which has no record.
+pub struct StepRow<'a, R> {
     pub run: R,
     record: Option<&'a Record>,
     measures: &'a Values,
 }
 
-/// The beginning of a run and its steps.
-pub fn of<R: Copy, const D: usize>(
+/// The rows of a run.
+pub fn rows<R: Copy, const D: usize>(
     run: R,
     trajectory: &Trajectory<D>,
-) -> impl Iterator<Item = Step<'_, R>> {
+) -> impl Iterator<Item = StepRow<'_, R>> {
     let records = trajectory.records.iter().map(Some);
-    [None].into_iter().chain(records).map(move |record| Step {
-        run,
-        record,
-        measures: record.map_or(&trajectory.start, |record| &record.measures),
-    })
+    [None]
+        .into_iter()
+        .chain(records)
+        .map(move |record| StepRow {
+            run,
+            record,
+            measures: record.map_or(&trajectory.start, |record| &record.measures),
+        })
 }
 
-/// Writes the steps of runs by any names, with method and scheme, as `steps.csv`.
+/// Writes the steps of runs by any names, with method and formulation, as `steps.csv`.
 pub fn write<'a, const D: usize>(
     session: &Session,
     named: &str,
     runs: impl Iterator<Item = (&'a str, &'a Trajectory<D>)>,
 ) -> Result<()> {
     // Without the beginning.
-    let steps = runs.flat_map(|(name, run)| of((name, &run.case.operator), run).skip(1));
+    let steps = runs.flat_map(|(name, run)| {
+        let discretization = run.case.operator.discretization;
+        rows((name, discretization), run).skip(1)
+    });
     let steps: Vec<_> = steps.collect();
     let sheet = Sheet::of(&steps)
         .text(named, |step| step.run.0)
         .text("method", |step| step.run.1.method.to_string())
-        .text("scheme", |step| step.run.1.scheme.to_string());
+        .text("scheme", |step| step.run.1.formulation.to_string());
     session.csv(columns(sheet, &steps), "steps")
 }
 
 /// Adds step, time and size, a column for every measure, and what the minimization did.
 pub fn columns<'a, R>(
-    sheet: Sheet<'a, Step<'a, R>>,
-    steps: &'a [Step<'a, R>],
-) -> Sheet<'a, Step<'a, R>> {
+    sheet: Sheet<'a, StepRow<'a, R>>,
+    steps: &'a [StepRow<'a, R>],
+) -> Sheet<'a, StepRow<'a, R>> {
     let measures = steps.iter().flat_map(|step| step.measures.keys());
     let measures: BTreeSet<&String> = measures.collect();
     let mut sheet = sheet
