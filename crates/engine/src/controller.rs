@@ -44,7 +44,7 @@ pub trait Controller<const D: usize> {
     fn judge(
         &mut self,
         from: &State<D>,
-        made: Result<&Candidate<D>, &StepError>,
+        attempted: Result<&Candidate<D>, &StepError>,
     ) -> Result<Verdict, StepError>;
 
     /// Moves on by a step that was taken; true if it completes a time step.
@@ -87,9 +87,9 @@ impl<const D: usize> Controller<D> for EqualSteps {
     fn judge(
         &mut self,
         _from: &State<D>,
-        made: Result<&Candidate<D>, &StepError>,
+        attempted: Result<&Candidate<D>, &StepError>,
     ) -> Result<Verdict, StepError> {
-        Ok(match made {
+        Ok(match attempted {
             Ok(_) => Verdict::Accept(Attempts::default()),
             Err(_) => Verdict::GiveUp { halvings: 0 },
         })

@@ -97,38 +97,34 @@ impl ControlledSteps {
     }
 
     /// The size with which a step is made again, if it was too long.
-    pub(crate) fn shorter(&self, made: &StepRecord) -> Option<f64> {
-        let estimates = made.estimates?;
-        let (by_error, by_displacement) = self.room(&estimates, made.tau, made.time);
+    pub(crate) fn shorter(&self, record: &StepRecord) -> Option<f64> {
+        let estimates = record.estimates?;
+        let (by_error, by_displacement) = self.room(&estimates, record.tau, record.time);
         let least = LEAST * self.time;
         let too_far = WORSE * by_displacement < AIM;
-        let too_wrong = WORSE * by_error * by_error < 1.0 && made.tau > 1.2 * least;
+        let too_wrong = WORSE * by_error * by_error < 1.0 && record.tau > 1.2 * least;
         if !(too_far || too_wrong) {
             return None;
         }
-        let shorter = made.tau * (0.85 * by_error.min(by_displacement)).clamp(0.25, 0.85);
+        let shorter = record.tau * (0.85 * by_error.min(by_displacement)).clamp(0.25, 0.85);
         Some(if too_far { shorter } else { shorter.max(least) })
     }
 
     pub(crate) fn accept(&mut self, record: &Record) {
-        let made = record.tau;
+        let tau = record.tau;
         self.time = record.time;
-        let Some(estimates) = record.minimization.and_then(|made| made.estimates) else {
+        let Some(estimates) = record.minimization.and_then(|step| step.estimates) else {
             return;
         };
-        let (by_error, by_displacement) = self.room(&estimates, made, record.time);
-        let by_error = (AIM * by_error).max(LEAST * self.time / made);
+        let (by_error, by_displacement) = self.room(&estimates, tau, record.time);
+        let by_error = (AIM * by_error).max(LEAST * self.time / tau);
         let growth = by_error.min(AIM * by_displacement).clamp(0.3, GROWTH);
         // A step that was cut short to end at a given time says little about the next one.
-        let before = if record.halvings == 0 {
-            self.size
+        let before = if record.halvings == 0 { self.size } else { tau };
+        let next = if tau > 0.5 * before {
+            tau * growth
         } else {
-            made
-        };
-        let next = if made > 0.5 * before {
-            made * growth
-        } else {
-            (before * growth.min(1.0)).max(made * growth)
+            (before * growth.min(1.0)).max(tau * growth)
         };
         self.size = next.min(self.largest);
     }

@@ -201,7 +201,7 @@ impl<const D: usize> Run<D> {
             far,
             refused_hvp,
         } = attempts;
-        let (made, time) = (candidate.made, candidate.state.time);
+        let (record, time) = (candidate.record, candidate.state.time);
         Record {
             step: self.steps() + 1,
             time,
@@ -210,7 +210,7 @@ impl<const D: usize> Run<D> {
             halvings,
             far,
             refused_hvp,
-            minimization: made,
+            minimization: record,
             ..Record::default()
         }
     }

@@ -43,7 +43,7 @@ pub struct StepControl {
     /// The size of controlled steps, and the time at which the present step is complete.
     controlled: Option<ControlledSteps>,
     due: f64,
-    /// Whether sizes are held.
+    /// Whether perimeter or volume are held.
     holds: bool,
     /// The attempts of the present step, after the first.
     attempt: Option<Attempt>,
@@ -133,8 +133,8 @@ impl StepControl {
     }
 
     /// The size with which a controlled step is made again, if it was too long.
-    fn shorter(&self, made: &StepRecord) -> Option<f64> {
-        self.controlled?.shorter(made)
+    fn shorter(&self, record: &StepRecord) -> Option<f64> {
+        self.controlled?.shorter(record)
     }
 
     /// How often that size may be halved where a minimization fails.
@@ -172,8 +172,67 @@ impl StepControl {
         }
     }
 
+    /// How often a step may be made shorter, whatever is wrong with it.
+    fn most_halvings(&self) -> u32 {
+        if self.holds {
+            self.halvings().max(self.halvings_of_motion())
+        } else {
+            self.halvings()
+        }
+    }
+
+    /// A candidate is taken unless a shorter step would help: its error is too large, or the interface has gone too far.
+    fn judge_candidate<const D: usize>(
+        &mut self,
+        attempt: Attempt,
+        from: &State<D>,
+        candidate: &Candidate<D>,
+    ) -> Result<Verdict, StepError> {
+        let record = candidate.record.as_ref();
+        let refused = record.map_or(0.0, StepRecord::hvp);
+        let shorter = record.and_then(|record| self.shorter(record));
+        if let Some(size) = shorter.filter(|_| attempt.halvings < self.most_halvings()) {
+            return Ok(self.try_again(attempt, size, refused));
+        }
+        // How far it has gone over how far it may go.
+        let part = match self.steps.longest_move {
+            Some(longest) => has_gone(from, &candidate.state)? / longest,
+            None => 0.0,
+        };
+        if part > 1.0 && attempt.halvings < self.halvings_of_motion() {
+            return Ok(self.try_again(attempt, 0.5 * attempt.size, refused));
+        }
+        Ok(Verdict::Accept(Attempts {
+            halvings: attempt.halvings,
+            far: part > FAR,
+            refused_hvp: attempt.refused_hvp,
+        }))
+    }
+
+    fn judge_failure(&mut self, attempt: Attempt, error: &StepError) -> Verdict {
+        let most = self.most_halvings();
+        if most == 0 || !error.shorter_step_may_succeed() {
+            return Verdict::GiveUp { halvings: 0 };
+        }
+        if attempt.halvings >= most {
+            let halvings = attempt.halvings;
+            return Verdict::GiveUp { halvings };
+        }
+        self.try_again(attempt, 0.5 * attempt.size, 0.0)
+    }
+
+    /// Another attempt of this size, after one that took so many Hessian-vector products.
+    fn try_again(&mut self, attempt: Attempt, size: f64, hvp: f64) -> Verdict {
+        self.attempt = Some(Attempt {
+            size,
+            halvings: attempt.halvings + 1,
+            refused_hvp: attempt.refused_hvp + hvp,
+        });
+        Verdict::Retry
+    }
+
     /// Moves on by a step; true if it completes the present time step.
-    fn made(&mut self, record: &Record) -> Result<bool, Error> {
+    fn move_on(&mut self, record: &Record) -> Result<bool, Error> {
         self.attempt = None;
         self.last = Some(Last {
             tau: record.tau,
@@ -221,52 +280,17 @@ impl<const D: usize> Controller<D> for StepControl {
     fn judge(
         &mut self,
         from: &State<D>,
-        made: Result<&Candidate<D>, &StepError>,
+        attempted: Result<&Candidate<D>, &StepError>,
     ) -> Result<Verdict, StepError> {
         let attempt = self.attempt();
-        let halvings = attempt.halvings;
-        let mut most = self.halvings();
-        if self.holds {
-            most = most.max(self.halvings_of_motion());
+        match attempted {
+            Ok(candidate) => self.judge_candidate(attempt, from, candidate),
+            Err(error) => Ok(self.judge_failure(attempt, error)),
         }
-        let mut shorter = None;
-        let refused = match made {
-            Ok(candidate) => {
-                let made = candidate.made.as_ref();
-                shorter = made.and_then(|made| self.shorter(made));
-                shorter = shorter.filter(|_| halvings < most);
-                if shorter.is_none() {
-                    // How far it has gone over how far it may go.
-                    let part = match self.steps.longest_move {
-                        Some(longest) => has_gone(from, &candidate.state)? / longest,
-                        None => 0.0,
-                    };
-                    if part <= 1.0 || halvings >= self.halvings_of_motion() {
-                        return Ok(Verdict::Accept(Attempts {
-                            halvings,
-                            far: part > FAR,
-                            refused_hvp: attempt.refused_hvp,
-                        }));
-                    }
-                }
-                made
-            }
-            Err(error) if most == 0 || !error.shorter_step_may_succeed() => {
-                return Ok(Verdict::GiveUp { halvings: 0 });
-            }
-            Err(_) if halvings < most => None,
-            Err(_) => return Ok(Verdict::GiveUp { halvings }),
-        };
-        self.attempt = Some(Attempt {
-            size: shorter.unwrap_or(0.5 * attempt.size),
-            halvings: halvings + 1,
-            refused_hvp: attempt.refused_hvp + refused.map_or(0.0, StepRecord::hvp),
-        });
-        Ok(Verdict::Retry)
     }
 
     fn accept(&mut self, record: &Record) -> Result<bool, Error> {
-        self.made(record)
+        self.move_on(record)
     }
 
     fn identity(&self) -> serde_json::Value {

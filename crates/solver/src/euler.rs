@@ -50,10 +50,10 @@ impl<const D: usize> Euler<D> {
         )?;
         let scale = problem.energy_scale();
         let at = At { from: &from, size };
-        let mut made = minimum.record(&at, start.origin, clock);
-        made.energy_before = scale * minimum.newton.energy_before;
-        made.energy = scale * minimum.newton.energy;
-        made.times.start = beginning;
+        let mut record = minimum.record(&at, start.origin, clock);
+        record.energy_before = scale * minimum.newton.energy_before;
+        record.energy = scale * minimum.newton.energy;
+        record.times.start = beginning;
         let mut memory = Memory {
             fields: start.half_motions,
             ..Memory::default()
@@ -66,7 +66,7 @@ impl<const D: usize> Euler<D> {
         Ok(Candidate {
             state,
             tau: size.tau,
-            made: Some(made),
+            record: Some(record),
         })
     }
 }

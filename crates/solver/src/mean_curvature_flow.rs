@@ -43,7 +43,7 @@ impl<const D: usize> Scheme<D> for MeanCurvatureFlow {
                 memory: Memory::default(),
             },
             tau: problem.params.mcf_step,
-            made: None,
+            record: None,
         })
     }
 

@@ -33,7 +33,7 @@ pub struct Candidate<const D: usize> {
     /// The size of the step: that which was asked for, but in flows whose steps have one size.
     pub tau: f64,
     /// What the minimizations did; none for a scheme that minimizes nothing.
-    pub made: Option<StepRecord>,
+    pub record: Option<StepRecord>,
 }
 
 /// A time step as a function: of a problem, a state and a size. What is traced or uploaded for a problem may be kept from one step to the next; what

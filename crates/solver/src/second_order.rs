@@ -141,7 +141,7 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         let clock = Instant::now();
         let from = problem.followed(from)?;
         let stages = self.stages(problem, &from, size)?;
-        let made = stages.record(problem, &At { from: &from, size }, clock);
+        let record = stages.record(problem, &At { from: &from, size }, clock);
         let ([_, rate], [_, second]) = (stages.rates, stages.minima);
         let mut memory = Memory::default();
         let rate = DeviceField::upload(&rate, &problem.device);
@@ -149,7 +149,7 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         Ok(Candidate {
             state: At { from: &from, size }.after(second.u, memory),
             tau: size.tau,
-            made: Some(made),
+            record: Some(record),
         })
     }
 

@@ -131,7 +131,7 @@ fn on_half_grid<const D: usize>(
         candidate => candidate?,
     };
     let made = candidate
-        .made
+        .record
         .expect("a step of Euler's method has a record");
     let moved = candidate.state.field.values().clone() - start.field.values().clone();
     let moved = start.field.with(moved);

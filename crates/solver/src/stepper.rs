@@ -38,7 +38,7 @@ impl<const D: usize, S: Scheme<D>> Stepper<D, S> {
         let size = StepSize::whole(tau);
         let candidate = self.scheme.step(&self.problem, &self.state, size)?;
         self.state = candidate.state;
-        Ok(candidate.made.unwrap_or_default())
+        Ok(candidate.record.unwrap_or_default())
     }
 
     /// The phase field now.

@@ -22,9 +22,9 @@ impl<const D: usize> Controller<D> for ByNewton {
     fn judge(
         &mut self,
         _from: &State<D>,
-        made: Result<&Candidate<D>, &StepError>,
+        attempted: Result<&Candidate<D>, &StepError>,
     ) -> Result<Verdict, StepError> {
-        Ok(match made {
+        Ok(match attempted {
             Ok(_) => Verdict::Accept(Attempts::default()),
             Err(error) if error.shorter_step_may_succeed() => {
                 self.tau *= 0.5;
@@ -35,7 +35,7 @@ impl<const D: usize> Controller<D> for ByNewton {
     }
 
     fn accept(&mut self, record: &Record) -> Result<bool, willmore::Error> {
-        let newton = record.minimization.map_or(0, |made| made.newton.newton);
+        let newton = record.minimization.map_or(0, |step| step.newton.newton);
         self.tau = match newton {
             0..=4 => 2.0 * record.tau,
             5..=8 => record.tau,
@@ -62,7 +62,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         .start(&Cross::new(0.3, 0.12)?)?;
     for record in flow.take(8) {
         let record = record?;
-        let newton = record.minimization.map_or(0, |made| made.newton.newton);
+        let newton = record.minimization.map_or(0, |step| step.newton.newton);
         println!("tau = {:.2e}: {newton} Newton steps", record.tau);
     }
     assert!(flow.time() > 8.0 * first);

@@ -23,7 +23,7 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
         let whole = self.whole.step(problem, from, size)?;
         let middle = self.half.step(problem, from, half)?;
         let Candidate {
-            mut state, made, ..
+            mut state, record, ..
         } = self.half.step(problem, &middle.state, half)?;
         // The records of a run count the steps of the scheme.
         state.step = from.step + 1;
@@ -37,12 +37,12 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
             motion: moved,
             displacement: moved,
         };
-        let made = made.map(|last| StepRecord {
+        let record = record.map(|last| StepRecord {
             step: state.step,
             tau: size.tau,
             energy_before: whole
-                .made
-                .map_or(last.energy_before, |made| made.energy_before),
+                .record
+                .map_or(last.energy_before, |whole| whole.energy_before),
             energy: 2.0 * size.tau * last.willmore_energy,
             estimates: Some(estimates),
             ..last
@@ -50,7 +50,7 @@ impl<const D: usize> Scheme<D> for StepDoubling<D> {
         Ok(Candidate {
             state,
             tau: size.tau,
-            made,
+            record,
         })
     }
 

@@ -80,7 +80,7 @@ impl<const D: usize> Flow<D> {
 
     fn take(&mut self, candidate: Candidate<D>) -> Option<StepRecord> {
         self.state = candidate.state;
-        candidate.made
+        candidate.record
     }
 
     /// An implicit Euler step.
