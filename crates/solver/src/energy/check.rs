@@ -109,11 +109,16 @@ pub(crate) fn fits<const D: usize>(
         }
     }
     let mut alone = Alone::new(term, on, extensions)?;
-    let [negative, positive] = [-1.0, 1.0].map(|value| on.sample(|_| value));
+    let constant = |value: f64| on.sample(|_| value);
     for (u, place) in [
         (profile, "on a flat interface"),
-        (negative, "in the pure phase outside"),
-        (positive, "in the pure phase inside"),
+        // Where nothing is stored beside it, too.
+        (
+            constant(on.phase_values()[0]),
+            "where the phase field is constant",
+        ),
+        (constant(-1.0), "at u = -1"),
+        (constant(1.0), "at u = 1"),
     ] {
         let mut derivatives = alone.gradient(&u)?;
         derivatives.extend(alone.product(&u)?);
