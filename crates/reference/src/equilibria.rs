@@ -92,11 +92,11 @@ pub fn vesicles(
     let vesicle = |&ratio: &f64| {
         path.follow(below_one("reduced volume", ratio)?)?;
         let scale = path.problem.scale(&path.state);
-        let [pressure, tension] = path.problem.multipliers(&path.state);
+        let [minus_pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Vesicle {
             surface: path.problem.surface(&path.state, scale),
             spontaneous_curvature,
-            pressure: pressure / scale.powi(3),
+            pressure: -minus_pressure / scale.powi(3),
             tension: tension / scale.powi(2),
         })
     };
@@ -111,10 +111,10 @@ pub fn elastica(quotients: &[f64]) -> Result<Vec<Elastica>, Error> {
     let mut path = Path::new(Kind::Elastica, &Shape::ellipse(1.5, 1.0)?)?;
     let curve = |&ratio: &f64| {
         path.follow(below_one("isoperimetric quotient", ratio)?)?;
-        let [pressure, tension] = path.problem.multipliers(&path.state);
+        let [minus_pressure, tension] = path.problem.multipliers(&path.state);
         Ok(Elastica {
             curve: path.problem.curve(&path.state, 1.0),
-            pressure,
+            pressure: -minus_pressure,
             tension,
         })
     };
@@ -136,7 +136,7 @@ enum Condition {
     Asymmetry(f64),
 }
 
-/// The equations of a curve scaled to length `2 pi`. The state is the sines of the tangent angle, then pressure and tension, then, of
+/// The equations of a curve scaled to length `2 pi`. The state is the sines of the tangent angle, then minus the pressure and the tension, then, of
 /// shapes without an equator, a force along the axis that is zero in equilibrium: the curve is closed by it, which is one equation
 /// more.
 #[derive(Clone)]
@@ -187,13 +187,14 @@ impl Problem {
             Kind::Elastica => (None, 0.0),
         };
         let nodes = Nodes::new(&self.grid, &odd(&state[..self.sines()]), axis);
-        let [pressure, tension] = self.multipliers(state);
+        let [minus_pressure, tension] = self.multipliers(state);
         let force = state.get(self.sines() + 2).copied().unwrap_or(0.0);
         let velocity = nodes.willmore(&self.grid);
         let equation = self.grid.expand(|i| {
             let product = nodes.curvature[i] * nodes.parallel[i];
             let stretch = (bend * bend / 2.0 + tension) * nodes.h[i];
-            stretch - velocity[i] - 2.0 * bend * product + pressure + force * nodes.tangent[i].re
+            stretch - velocity[i] - 2.0 * bend * product - minus_pressure
+                + force * nodes.tangent[i].re
         });
         let mut result = collect(self.grid.points / 2, |j| equation[j].re);
         if self.grid.folds == 1 {
@@ -317,8 +318,8 @@ impl Path {
         const STEP: f64 = 0.1;
         self.follow(BIFURCATION)?;
         let oblate = self.problem.curve(&self.state, 1.0).unfolded();
-        let [pressure, tension] = self.problem.multipliers(&self.state);
-        let rest = [pressure, tension, 0.0];
+        let [minus_pressure, tension] = self.problem.multipliers(&self.state);
+        let rest = [minus_pressure, tension, 0.0];
         self.state = sines(&oblate.angle).chain(rest).collect();
         self.problem.grid = oblate.grid;
         // At no asymmetry at all the equations are singular.
