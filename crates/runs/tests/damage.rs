@@ -306,13 +306,13 @@ fn other_versions_are_refused_with_both_values() {
     run_to(&run, 5).unwrap();
     let path = run.join("checkpoints/step-00000003.ckpt");
     let mut bytes = fs::read(&path).unwrap();
-    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x05\0\0\0");
+    assert_eq!(&bytes[..12], b"\x8fckpt\r\n\x1a\x06\0\0\0");
     for version in [3, 7] {
         bytes[8] = version;
         fs::write(&path, rehashed(&bytes)).unwrap();
         let message = RunDirectory::open(&run).unwrap_err().to_string();
         assert!(message.contains(&format!("version {version}")), "{message}");
-        assert!(message.contains("version 5") && message.contains("step-00000003"));
+        assert!(message.contains("version 6") && message.contains("step-00000003"));
     }
     // Before its first checkpoint, a run of version 1 has this alone.
     let old = folder.path().join("old");
