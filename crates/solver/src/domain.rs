@@ -23,7 +23,7 @@ pub struct DomainScales {
 ///
 /// A formula that is made of these operations is the same one in all ways of storing: on the whole grid, on bricks, and on the
 /// coarser grids on which steps begin. Tensors have the [shape](Self::shape) of the stored values and the precision of the device. What is not stored is constant, at
-/// one of two values, the [phase_values](Self::phase_values) of the phases.
+/// the [value of its phase](Self::phase_values).
 ///
 /// ```
 /// use geometry::{Field, Grid};
@@ -196,7 +196,7 @@ impl<const D: usize> Domain<D> {
     }
 
     /// `eps q'(u) |grad u|`: the area of the interface (the length in the plane) per volume, with the [slope](Self::slope) `q'`. By the coarea
-    /// formula its integral is the area of the zero set for every monotone profile, so that `f(x)` times it, too, moves the interface and does not bend its profile.
+    /// formula its integral is a mean of the areas of the level sets, whatever the profile. So `f(x)` times it moves the interface and does not bend its profile.
     ///
     /// The root is `sqrt(|grad u|^2 + (d / eps)^2) - d / eps` with `d = 1/1000`: it has derivatives where `u` is constant.
     pub fn area(&self, u: &Tensor<D>) -> Tensor<D> {

@@ -105,7 +105,7 @@ impl<const D: usize> MovementGraph<'_, D> {
             return error.into();
         }
         for term in self.terms {
-            let graph = check::graph_of_term(&**term, self.domain);
+            let graph = check::graph_of_term(&**term, self.domain, check::whole_energy);
             let alone = graph.map(|graph| graph.linearize(extensions, None));
             if let Ok(Err(source)) = alone {
                 let name = term.identity().name;

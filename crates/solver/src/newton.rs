@@ -93,7 +93,7 @@ struct Minimizer<'a, 'h, const D: usize, O> {
     times: Cell<PhaseTimes>,
 }
 
-/// Minimizes `objective` from `start`. `previous` is the phase field before the step, from which the motion counts; it is the start if that is better.
+/// Minimizes `objective` from `start`, or from `previous`, the phase field before the step, if its energy is lower. Motions are differences to `previous`.
 ///
 /// # Errors
 /// [`Error::Geometry`]; [`Error::NonFinite`] (with step 0: the caller knows the number) if the start has no finite energy;
@@ -434,7 +434,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         self.point(Place { u, tangent })
     }
 
-    /// The whole of the last Newton step if it does not raise the energy, by more than rounding where that is `lost` in it.
+    /// The result of the whole last Newton step, or the point before it if the step raises the energy. A rise by rounding does not count where the expected
+    /// decrease is `lost` in rounding.
     fn last_step(
         &mut self,
         point: Point<D>,

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use willmore::prelude::*;
 
-use crate::own::{FLOWS, four_steps};
+use crate::own::{FLOWS, bits, four_steps};
 
 /// The name and the folder of the flow of the process.
 const FLOW: &str = "WILLMORE_TEST_FLOW";
@@ -70,11 +70,7 @@ fn killed_flows_with_own_parts_go_on_to_the_same_bytes() {
         let [whole, killed] =
             ["whole", "killed"].map(|part| root.path().join(format!("{name} {part}")));
         kill(name, &killed);
-        let run = |folder: &Path| {
-            let run = four_steps(flow, folder, &mut [], &Interrupt::never());
-            let bits = run.field().values().iter().map(|u| u.to_bits());
-            bits.collect::<Vec<u64>>()
-        };
-        assert!(run(&whole) == run(&killed), "{name}");
+        let run = |folder: &Path| four_steps(flow, folder, &mut [], &Interrupt::never());
+        assert!(bits(&run(&whole)) == bits(&run(&killed)), "{name}");
     }
 }

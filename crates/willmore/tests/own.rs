@@ -197,6 +197,10 @@ pub fn four_steps(
     kept.run
 }
 
+pub fn bits(run: &Run<2>) -> Vec<u64> {
+    run.field().values().iter().map(|u| u.to_bits()).collect()
+}
+
 #[test]
 fn interrupted_runs_with_own_parts_go_on_to_the_same_bytes() {
     let root = tempfile::tempdir().unwrap();
@@ -210,8 +214,7 @@ fn interrupted_runs_with_own_parts_go_on_to_the_same_bytes() {
         let [whole, parts] = [whole, parts].map(|folder| {
             let run = four_steps(flow, &folder, &mut [], &Interrupt::never());
             assert_eq!(run.records().len(), 4, "{name}");
-            let bits = run.field().values().iter().map(|u| u.to_bits());
-            bits.collect::<Vec<u64>>()
+            bits(&run)
         });
         assert!(whole == parts, "{name}");
     }

@@ -39,9 +39,10 @@ impl<const D: usize> Alone<D> {
     fn new(
         term: &dyn EnergyTerm<D>,
         on: &Domain<D>,
+        energy: EnergyOf<D>,
         extensions: &Extensions,
     ) -> Result<Self, Error> {
-        let graph = graph_of_term(term, on)?;
+        let graph = graph_of_term(term, on, energy)?;
         let named = |source| Error::Term {
             name: term.identity().name,
             source,
@@ -70,23 +71,47 @@ impl<const D: usize> Alone<D> {
     }
 }
 
-/// The energy of a term and the sum of its shifts as a graph.
+/// An energy of a term.
+type EnergyOf<const D: usize> =
+    fn(&dyn EnergyTerm<D>, &Tensor<D>, &Domain<D>) -> Result<Option<Tensor<1>>, Error>;
+
+/// All of it.
+pub(super) fn whole_energy<const D: usize>(
+    term: &dyn EnergyTerm<D>,
+    u: &Tensor<D>,
+    on: &Domain<D>,
+) -> Result<Option<Tensor<1>>, Error> {
+    term.energy(u, on)
+}
+
+/// That of the stored nodes, where the rest would take the work of the whole grid.
+fn stored_energy<const D: usize>(
+    term: &dyn EnergyTerm<D>,
+    u: &Tensor<D>,
+    on: &Domain<D>,
+) -> Result<Option<Tensor<1>>, Error> {
+    match term.density(u, on)? {
+        Some(density) => Ok(Some(density.sum() * on.cell_volume())),
+        None => term.energy(u, on),
+    }
+}
+
+/// An energy of a term and the sum of its shifts as a graph.
 pub(super) fn graph_of_term<const D: usize>(
     term: &dyn EnergyTerm<D>,
     on: &Domain<D>,
+    energy: EnergyOf<D>,
 ) -> Result<Graph, Error> {
     let device = on.device();
     let zeros = Tensor::<D>::zeros(on.shape(), (device.device(), device.dtype()));
     graph_of(&[Value::from(zeros)], &[], |inputs| {
         let u = inputs.variable::<D>(0);
         let on = on.at(&u.device());
-        let energy = match term.density(&u, &on)? {
-            // The part that is not stored is a number.
-            Some(density) => Some(density.sum() * on.cell_volume()),
-            None => term.energy(&u, &on)?,
-        };
         let shift = term.shift(&u, &on)?.map(Tensor::sum);
-        let sum = energy.into_iter().chain(shift).reduce(|a, b| a + b);
+        let sum = energy(term, &u, &on)?
+            .into_iter()
+            .chain(shift)
+            .reduce(|a, b| a + b);
         Ok(sum.unwrap_or_else(|| u.sum() * 0.0))
     })
 }
@@ -108,7 +133,7 @@ pub(crate) fn fits<const D: usize>(
             });
         }
     }
-    let mut alone = Alone::new(term, on, extensions)?;
+    let mut alone = Alone::new(term, on, stored_energy, extensions)?;
     let constant = |value: f64| on.sample(|_| value);
     for (u, place) in [
         (profile, "on a flat interface"),
@@ -137,7 +162,7 @@ pub(crate) fn check<const D: usize>(
     on: &Domain<D>,
     extensions: &Extensions,
 ) -> Result<TermCheck, Error> {
-    let mut alone = Alone::new(term, on, extensions)?;
+    let mut alone = Alone::new(term, on, whole_energy, extensions)?;
     let wave = on.sample(|x| {
         x.iter()
             .zip(1..)
