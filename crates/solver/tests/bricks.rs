@@ -95,15 +95,15 @@ pub fn cross_of(cells: usize) -> Field<2> {
 }
 
 fn dented() -> Field<3> {
-    dented_of(64)
+    dented_of(64, 0.17)
 }
 
-/// With so many cells per side.
-pub fn dented_of(cells: usize) -> Field<3> {
-    let dented = |x: [f64; 3]| {
+/// With so many cells per side of a box of 1/2.
+pub fn dented_of(cells: usize, radius: f64) -> Field<3> {
+    let dented = move |x: [f64; 3]| {
         let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let [a, b, c] = x.map(|x| x / r.max(1e-9));
-        r - 0.17 * (1.0 + 0.2 * (4.0 * a * b * c + 0.5 * c.powi(3) - 0.4 * a * a))
+        r - radius * (1.0 + 0.2 * (4.0 * a * b * c + 0.5 * c.powi(3) - 0.4 * a * a))
     };
     field(Grid::centred(cells, 0.5).unwrap(), &dented)
 }

@@ -26,6 +26,7 @@ const EPS_OVER_H: f64 = 2.0;
 ///
 /// The defaults: `eps = 2 h`, `tautilde = eps^2 / 4`; the shipped learned operator of the accurate recipe, calibrated; bricks near the interface where they are
 /// less than half of the grid; steps of second order whose sizes their errors control; nothing held; perimeter and volume measured.
+#[derive(Clone)]
 pub struct Willmore<const D: usize> {
     grid: Grid<D>,
     eps_over_h: f64,

@@ -1,6 +1,7 @@
 //! What parts of one's own get from the loop: bricks, control of the steps, held sizes, and resuming to the same bytes.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use willmore::prelude::*;
 
@@ -37,8 +38,10 @@ fn allen_cahn() -> Willmore<2> {
     own_operator::flow().unwrap()
 }
 
+/// Its network is trained once.
 fn residual() -> Willmore<2> {
-    own_network::flow().unwrap()
+    static FLOW: OnceLock<Willmore<2>> = OnceLock::new();
+    FLOW.get_or_init(|| own_network::flow().unwrap()).clone()
 }
 
 /// The difference of both ways of storing after two steps, over the motion.
