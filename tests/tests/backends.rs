@@ -13,8 +13,9 @@ use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network, Shipped};
 use operators::{
     COEFFICIENTS, ComputeDevice, HermiteTable, HostUpdate, Interpolation, Real, SharedUpdate,
-    SpectralFilter, TableRange, add_scaled, brick_convolution, circular_convolution, extrapolate,
-    inner_product, retract, spectral_filter, tabulated, update_on_host,
+    SpectralFilter, TableRange, add_scaled, brick_convolution, brick_pass, circular_convolution,
+    combined, extrapolate, inner_product, retract, scaled, spectral_filter, tabulated,
+    update_on_host,
 };
 use solver::{
     Exit, FlowParams, MeanCurvatureStep, MinimizingMovement, NewtonParams, Objective, Problem,
@@ -324,6 +325,8 @@ fn operations_take_slices_for_what_they_are() {
             &sum,
             "sum",
         );
+        let combination = combined(scaled(&grid_of(&x), 0.5), 2.0, &grid_of(&g), 3.0);
+        check(&values(combination), &sum, "combination");
         let update = SharedUpdate::new(AddThrice);
         let updated = update_on_host(&grid_of(&g), grid_of(&x), &update);
         check(&values(updated), &sum, "update");
@@ -334,12 +337,17 @@ fn operations_take_slices_for_what_they_are() {
     }
 }
 
-/// Passes along every axis with values outside of the bricks as zero, from their definition.
-fn passes<const D: usize>(nodes: &Nodes<D>, x: &[f64], taps: &[f64], adjoint: bool) -> Vec<f64> {
+/// Passes along these axes with values outside of the bricks as zero, from their definition.
+fn passes<const D: usize>(
+    nodes: &Nodes<D>,
+    x: &[f64],
+    taps: &[f64],
+    axes: &[usize],
+    adjoint: bool,
+) -> Vec<f64> {
     let (cells, reach) = (nodes.grid().cells(), taps.len() / 2);
     let mut x = x.to_vec();
-    for pass in 0..D {
-        let axis = if adjoint { pass } else { D - 1 - pass };
+    for &axis in axes {
         let at = |node: usize, k: usize| {
             let mut place = nodes.multi_index(node);
             place[axis] = (place[axis] + cells + k - reach) % cells;
@@ -361,19 +369,33 @@ fn brick_case<const D: usize>(side: usize, reach: usize) {
     let count = bricks.places().len();
     for backend in &backends() {
         let device = &backend.device;
+        let field = device.tensor::<D>(&x, bricks.shape());
+        let weights = device.tensor(&taps, [taps.len()]);
         let neighbours = device.tensor::<2>(&bricks.neighbours(), [count, 2 * D]);
-        for adjoint in [false, true] {
-            let found = brick_convolution(
-                device.tensor::<D>(&x, bricks.shape()),
-                device.tensor(&taps, [taps.len()]),
-                neighbours.clone(),
-                adjoint,
-            );
-            let expected = passes(&nodes, &x, &taps, adjoint);
+        let check = |found: Tensor<D>, axes: &[usize], adjoint: bool| {
+            let expected = passes(&nodes, &x, &taps, axes, adjoint);
             let tolerance = backend.tolerance(1e-13, 1e-6);
-            let what = format!("passes over bricks of {side}^{D}, adjoint: {adjoint}");
+            let what = format!("passes over bricks of {side}^{D}, {axes:?}, adjoint: {adjoint}");
             let found = device.values(found).unwrap();
             close(backend, &found, &expected, tolerance, &what);
+        };
+        let mut axes: Vec<usize> = (0..D).collect();
+        for adjoint in [true, false] {
+            let (x, taps) = (field.clone(), weights.clone());
+            let found = brick_convolution(x, taps, neighbours.clone(), adjoint);
+            check(found, &axes, adjoint);
+            axes.reverse();
+        }
+        for axis in 0..D {
+            let pass = |x| brick_pass(x, weights.clone(), neighbours.clone(), axis);
+            check(pass(field.clone()), &[axis], false);
+            // The derivative of `sum y pass(x)` by `x` is the transpose of the pass, at `y`.
+            let variable = field.clone().autodiff().require_grad();
+            let y = field.clone().autodiff();
+            let (taps, table) = (weights.clone().autodiff(), neighbours.clone().autodiff());
+            let image = brick_pass(variable.clone(), taps, table, axis);
+            let gradients = (image * y).sum().backward();
+            check(variable.grad(&gradients).unwrap(), &[axis], true);
         }
     }
 }

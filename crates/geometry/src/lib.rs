@@ -38,12 +38,12 @@
 //! - A [`Grid`] is a periodic cube of side `L` with `N` cells per side, `h = L/N`. Its `N^D`
 //!   nodes are `origin + i h`, `i = 0..N-1`; the repeated last layer is not stored. Values are
 //!   ordered row-major, last axis fastest.
-//! - Signed distances are negative inside. Phase fields are `u = tanh(-3 s / (4 eps))`: positive
-//!   inside, zero on the interface.
-//! - The double well is `Psi(v) = 9/16 (1 - v^2)^2` and the perimeter
-//!   `P_eps[v] = 1/2 integral of eps |grad v|^2 + Psi(v)/eps`, so that it equals length or area in
+//! - Signed distances $`s`$ are negative inside. Phase fields are $`u = \tanh(-3 s / (4 \varepsilon))`$: positive
+//!   inside, zero on the interface, whose width is $`\varepsilon`$.
+//! - The double well is $`\Psi(v) = \frac{9}{16} (1 - v^2)^2`$ and the perimeter
+//!   $`P_\varepsilon[v] = \frac{1}{2} \int \varepsilon |\nabla v|^2 + \Psi(v) / \varepsilon`$, so that it equals length or area in
 //!   the limit.
-//! - The `L2` norm is `sqrt(h^D sum u^2)`, an integral and not a mean.
+//! - The $`L^2`$ norm is $`(h^D \sum u^2)^{1/2}`$, an integral and not a mean.
 //! - Mean curvature is the sum of the principal curvatures; see [`exact`] for flows and energies.
 //! - Everything is generic over the dimension `D` unless it exists in one dimension only.
 //! - Same input, same bytes: parallel sums have a fixed order.

@@ -1,15 +1,20 @@
 //! What a step of mean curvature flow makes of the Willmore energy: its effective factor, from the flat interface.
 //!
-//! The scheme measures curvature as `|v[u] - u|^2 / tautilde^2`, and minimizing its energy also relaxes the interface's
-//! profile. To first order in the curvature `kappa` (sum of the principal ones) the energy that is left per area is
+//! The scheme measures curvature as $`|v[u] - u|^2 / \tilde\tau^2`$, and minimizing its energy also relaxes the interface's
+//! profile. To first order in the curvature $`\kappa`$ (sum of the principal ones) the energy that is left per area is
 //!
-//! `eps / (2 tautilde^2) min |v[u] - u|^2 = c/2 (kappa - kappa_0)^2 + ...`
+//! ```math
+//! \frac{\varepsilon}{2 \tilde\tau^2} \min |v[u] - u|^2 = \frac{c}{2} (\kappa - \kappa_0)^2 + \dots
+//! ```
 //!
-//! and a displacement `delta` of the interface costs `eps |u - u_k|^2 = m delta^2`, where for an exact step `c = m = 1` and
-//! `kappa_0 = 0`. With the flat interface `w` of the step, its derivative `J = v'[w]`, the left null vector `psi` of
-//! `J - 1`, the response `A = d/dkappa (v[u] - u)` to bending the interface, and the optimal profile `q`,
+//! and a displacement $`\delta`$ of the interface costs $`\varepsilon |u - u_k|^2 = m \delta^2`$, where for an exact step $`c = m = 1`$ and
+//! $`\kappa_0 = 0`$. With the flat interface $`w`$ of the step, its derivative $`J = v'[w]`$, the left null vector $`\psi`$ of
+//! $`J - 1`$, the response $`A = \frac{d}{d\kappa} (v[u] - u)`$ to bending the interface, and the optimal profile $`q`$,
 //!
-//! `c = <A, psi>^2 / (|psi|^2 tautilde^2 |q'|^2)`, `m = |w'|^2 / |q'|^2`, `kappa_0 = -<v[w] - w, psi> / <A, psi>`.
+//! ```math
+//! c = \frac{\langle A, \psi \rangle^2}{|\psi|^2 \, \tilde\tau^2 \, |q'|^2}, \qquad m = \frac{|w'|^2}{|q'|^2}, \qquad
+//! \kappa_0 = -\frac{\langle v[w] - w, \psi \rangle}{\langle A, \psi \rangle} .
+//! ```
 //!
 //! `docs/calibration.md` derives this. Flat interfaces with a rational normal are functions on equidistant planes, so that all
 //! of it is a small dense problem in one dimension ([`PlanarStep`]), solved for several positions of the interface between the

@@ -1,7 +1,13 @@
 //! Steps of mean curvature flow `v[u]`: what a solver asks of one, and what one makes of the Willmore energy.
 //!
 //! [`MeanCurvatureStep`] is the trait that learned operators, finite elements and a person's own steps implement. The solver of Willmore
-//! flow measures curvature as `|v[u] - u|^2 / tautilde^2` with any of them. [`calibration`] says what that makes of the Willmore energy,
+//! flow measures curvature with any of them: the Willmore energy of the zero set of $`u`$ is about
+//!
+//! ```math
+//! w[u] = \frac{\varepsilon}{2 c \tilde\tau^2} \int |v[u] - u|^2
+//! ```
+//!
+//! with the size $`\tilde\tau`$ of the step, the width $`\varepsilon`$ of the interface, and a factor $`c`$, which is 1 for an exact step. [`calibration`] says what that makes of the Willmore energy,
 //! [`measured`] finds it, and the inverse in the pure phases, for steps that only say what `v[u]` is.
 
 pub mod calibration;

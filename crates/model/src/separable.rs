@@ -9,8 +9,8 @@ use mean_curvature::{
     StepFailure, StepScales,
 };
 use operators::{
-    COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, add_scaled, brick_convolution,
-    convolution_of_outside, tabulated,
+    COEFFICIENTS, ComputeDevice, HermiteTable, TableRange, brick_convolution, combined,
+    convolution_of_outside, scaled, tabulated,
 };
 
 use crate::operator::identity;
@@ -153,16 +153,15 @@ impl<const D: usize> BrickOperator<D> {
         let y = y / self.operator.taps.iter().sum::<f64>().powi(D as i32);
         let (taps, neighbours) = (self.taps.clone(), self.neighbours.clone());
         move |r| {
-            let identity = r.clone() * x;
             if y == 0.0 {
-                return identity;
+                return scaled(r, x);
             }
             let (taps, neighbours) = (
                 taps.clone().cast(r.dtype()),
                 neighbours.clone().cast(r.dtype()),
             );
             let smoothed = brick_convolution(r.clone(), taps, neighbours, false);
-            add_scaled(identity, &smoothed, y)
+            combined(smoothed, y, r, x)
         }
     }
 }

@@ -9,6 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::fft::{Real, lock};
+use crate::ops::Passes;
 
 /// Bricks per task.
 const GROUP: usize = 8;
@@ -28,12 +29,37 @@ pub fn convolution_of_outside<const D: usize>(
     taps: &[f64],
     phase_values: [f64; 2],
 ) -> Vec<f64> {
-    let bricks = neighbours.len() / (2 * D);
-    let zeros = vec![0.0; bricks * side.pow(D as u32)];
-    convolve(&zeros, (side, D), neighbours, taps, false, phase_values)
+    of_outside::<D>(side, neighbours, taps, None, phase_values)
 }
 
-/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on; where no brick is active they see
+/// What these constants add to a [`crate::brick_pass`] along an axis.
+pub fn pass_of_outside<const D: usize>(
+    side: usize,
+    neighbours: &[f64],
+    taps: &[f64],
+    axis: usize,
+    phase_values: [f64; 2],
+) -> Vec<f64> {
+    of_outside::<D>(side, neighbours, taps, Some(axis), phase_values)
+}
+
+fn of_outside<const D: usize>(
+    side: usize,
+    neighbours: &[f64],
+    taps: &[f64],
+    axis: Option<usize>,
+    phase_values: [f64; 2],
+) -> Vec<f64> {
+    let bricks = neighbours.len() / (2 * D);
+    let zeros = vec![0.0; bricks * side.pow(D as u32)];
+    let passes = Passes {
+        axis,
+        adjoint: false,
+    };
+    convolve(&zeros, (side, D), neighbours, taps, passes, phase_values)
+}
+
+/// `sum_b t_b .. t_c x_{a+(b,..,c)}` by passes along the last axis, the one before it, and so on, or by one pass; where no brick is active they see
 /// `phase_values`, constants in the negative and in the positive phase. The adjoint takes the passes in the opposite order with mirrored taps,
 /// which is the transpose although passes that are cut at the edge of the bricks do not commute.
 ///
@@ -44,14 +70,14 @@ pub(crate) fn convolve<T: Real>(
     (side, axes): (usize, usize),
     neighbours: &[T],
     taps: &[T],
-    adjoint: bool,
+    passes: Passes,
     phase_values: [f64; 2],
 ) -> Vec<T> {
     let reach = taps.len() / 2;
     debug_assert!(taps.len() % 2 == 1 && reach <= side && side.is_multiple_of(MOST_LANES));
     let mut weights = vec![T::zero(); ROWS - 1];
     weights.extend_from_slice(taps);
-    if adjoint {
+    if passes.adjoint {
         weights[ROWS - 1..].reverse();
     }
     weights.resize(weights.len() + ROWS - 1, T::zero());
@@ -62,10 +88,10 @@ pub(crate) fn convolve<T: Real>(
     let mut kept = std::mem::take(&mut *lock(&T::shared().scratch));
     kept.resize(x.len(), T::zero());
     let mut result = vec![T::zero(); x.len()];
-    for pass in 0..axes {
-        let axis = if adjoint { pass } else { axes - 1 - pass };
+    let order = passes.order(axes);
+    for (pass, &axis) in order.iter().enumerate() {
         let constants = phase_values.map(|rest| vec![rest; volume]);
-        let (from, to) = if (axes - pass).is_multiple_of(2) {
+        let (from, to) = if (order.len() - pass).is_multiple_of(2) {
             (&mut result, &mut kept)
         } else {
             (&mut kept, &mut result)
@@ -272,9 +298,23 @@ mod tests {
         Bricks::new(cells, side, active, |place| place[0] % 2 == 0).unwrap()
     }
 
-    fn on<const D: usize>(bricks: &Bricks<D>, x: &[f64], taps: &[f64], adjoint: bool) -> Vec<f64> {
+    const ALL: Passes = Passes {
+        axis: None,
+        adjoint: false,
+    };
+
+    fn on<const D: usize>(bricks: &Bricks<D>, x: &[f64], taps: &[f64], passes: Passes) -> Vec<f64> {
         let shape = (bricks.side(), D);
-        convolve(x, shape, &bricks.neighbours(), taps, adjoint, [0.0; 2])
+        convolve(x, shape, &bricks.neighbours(), taps, passes, [0.0; 2])
+    }
+
+    /// All passes, and each of them alone.
+    fn choices<const D: usize>() -> impl Iterator<Item = Passes> {
+        let alone = (0..D).map(|axis| Passes {
+            axis: Some(axis),
+            ..ALL
+        });
+        std::iter::once(ALL).chain(alone)
     }
 
     /// The definition on the whole grid: after every pass what is not active is `phase_values`, times what a pass makes of constants.
@@ -282,11 +322,12 @@ mod tests {
         bricks: &Bricks<D>,
         x: &[f64],
         taps: &[f64],
+        passes: Passes,
         mut phase_values: [f64; 2],
     ) -> Vec<f64> {
         let (cells, reach) = (bricks.cells(), taps.len() / 2);
         let mut dense = bricks.scatter(x, phase_values);
-        for axis in (0..D).rev() {
+        for axis in passes.order(D) {
             let stride = cells.pow((D - 1 - axis) as u32);
             let passed: Vec<f64> = (0..dense.len())
                 .map(|i| {
@@ -310,11 +351,15 @@ mod tests {
         let x = noise(bricks.len(), 1);
         let taps = noise(2 * reach + 1, 2);
         let phase_values = [-0.9, 1.1];
-        let outside = convolution_of_outside::<D>(side, &bricks.neighbours(), &taps, phase_values);
-        let linear = on(&bricks, &x, &taps, false);
-        let both: Vec<f64> = linear.iter().zip(&outside).map(|(a, b)| a + b).collect();
-        assert_near(&linear, &by_passes(&bricks, &x, &taps, [0.0; 2]), 1e-13);
-        assert_near(&both, &by_passes(&bricks, &x, &taps, phase_values), 1e-13);
+        for passes in choices::<D>() {
+            let (table, axis) = (bricks.neighbours(), passes.axis);
+            let outside = of_outside::<D>(side, &table, &taps, axis, phase_values);
+            let linear = on(&bricks, &x, &taps, passes);
+            let both: Vec<f64> = linear.iter().zip(&outside).map(|(a, b)| a + b).collect();
+            let exact = |phase_values| by_passes(&bricks, &x, &taps, passes, phase_values);
+            assert_near(&linear, &exact([0.0; 2]), 1e-13);
+            assert_near(&both, &exact(phase_values), 1e-13);
+        }
     }
 
     #[test]
@@ -332,11 +377,13 @@ mod tests {
             let bricks = some::<D>(cells, side);
             let (x, y) = (noise(bricks.len(), 3), noise(bricks.len(), 4));
             let taps = noise(2 * reach + 1, 5);
-            let left = dot(&on(&bricks, &x, &taps, false), &y);
-            let right = dot(&x, &on(&bricks, &y, &taps, true));
-            let image = on(&bricks, &x, &taps, false);
-            let scale = (dot(&image, &image) * dot(&y, &y)).sqrt();
-            assert!((left - right).abs() < 1e-14 * scale, "{left} {right}");
+            for passes in choices::<D>() {
+                let image = on(&bricks, &x, &taps, passes);
+                let left = dot(&image, &y);
+                let right = dot(&x, &on(&bricks, &y, &taps, passes.transposed()));
+                let scale = (dot(&image, &image) * dot(&y, &y)).sqrt();
+                assert!((left - right).abs() < 1e-14 * scale, "{left} {right}");
+            }
         }
         check::<2>(64, 16, 8);
         check::<3>(32, 8, 8);
@@ -354,7 +401,8 @@ mod tests {
         let dense = noise(cells * cells, 7);
         for adjoint in [false, true] {
             let expected = circular(&dense, &[cells; 2], &kernel, width, adjoint);
-            let found = on(&all, &all.gather(&dense), &taps, adjoint);
+            let passes = Passes { adjoint, ..ALL };
+            let found = on(&all, &all.gather(&dense), &taps, passes);
             assert_near(&all.scatter(&found, [0.0; 2]), &expected, 1e-13);
         }
     }
@@ -363,18 +411,19 @@ mod tests {
     fn single_precision_and_one_thread_agree() {
         let bricks = some::<3>(32, 8);
         let (x, taps) = (noise(bricks.len(), 8), noise(17, 9));
-        let double = on(&bricks, &x, &taps, true);
+        let passes = ALL.transposed();
+        let double = on(&bricks, &x, &taps, passes);
         let single = |x: &[f64]| -> Vec<f32> { x.iter().map(|&x| x as f32).collect() };
         let table = bricks.neighbours();
         let run = || {
             let (x, table, taps) = (single(&x), single(&table), single(&taps));
-            convolve(&x, (8, 3), &table, &taps, true, [0.0; 2])
+            convolve(&x, (8, 3), &table, &taps, passes, [0.0; 2])
         };
         let found: Vec<f64> = run().into_iter().map(f64::from).collect();
         assert_near(&found, &double, 1e-5);
         let one = rayon::ThreadPoolBuilder::new().num_threads(1);
         let one = one.build().unwrap();
         assert_eq!(run(), one.install(run));
-        assert_eq!(double, one.install(|| on(&bricks, &x, &taps, true)));
+        assert_eq!(double, one.install(|| on(&bricks, &x, &taps, passes)));
     }
 }

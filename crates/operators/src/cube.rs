@@ -54,8 +54,8 @@ impl GridOps for Cube {
                     down(spectral::kernel_correlation::<R, K>(up(x), up(g), width))
                 })
             }
-            Operation::Bricks(x, taps, neighbours, adjoint) => {
-                kernels::brick_convolution(x, &taps, &neighbours, adjoint)
+            Operation::Bricks(x, taps, neighbours, passes) => {
+                kernels::brick_convolution(x, &taps, &neighbours, passes)
             }
             Operation::Tabulated(w, table, range, order) => {
                 kernels::tabulated(w, table, range, order)
@@ -67,6 +67,10 @@ impl GridOps for Cube {
 impl VectorOps for Cube {
     fn inner_product(a: CubeTensor, b: CubeTensor) -> CubeTensor {
         Self::float_sum(kernels::partial_sums(a, Some(b)))
+    }
+
+    fn scaled(x: CubeTensor, a: f64) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 1 2 3 4, R => down(up::<R>(x) * a))
     }
 
     fn spectral_filter(x: CubeTensor, filter: SpectralFilter) -> CubeTensor {
@@ -82,6 +86,7 @@ impl VectorOps for Cube {
             let (x, y) = (up::<R>(x), up::<R>(y));
             down(match motion {
                 Motion::Straight(alpha) => x + y * alpha,
+                Motion::Combined(a, b) => x * a + y * b,
                 Motion::Retracted(t) => profile::retract(x, y, t),
                 Motion::Extrapolated(factor) => profile::extrapolate(x, y, factor),
             })

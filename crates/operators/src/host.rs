@@ -85,7 +85,7 @@ impl<B: Host> GridOps for B {
                     B::tensor(c, vec![width; axes].into())
                 })
             }
-            Operation::Bricks(x, taps, neighbours, adjoint) => {
+            Operation::Bricks(x, taps, neighbours, passes) => {
                 let (dtype, shape) = (x.dtype(), x.shape());
                 let axes = shape.num_dims();
                 let bricks = (shape[axes - 1], axes);
@@ -94,7 +94,7 @@ impl<B: Host> GridOps for B {
                     let x = B::values::<T>(&x);
                     let (taps, neighbours) = (B::values(&taps), B::values(&neighbours));
                     let y = brick_convolution::convolve(
-                        x, bricks, neighbours, taps, adjoint, [0.0; 2],
+                        x, bricks, neighbours, taps, passes, [0.0; 2],
                     );
                     B::tensor(y, shape)
                 })
@@ -137,6 +137,15 @@ impl<B: Host> VectorOps for B {
         B::tensor(vec![sum], vec![1].into())
     }
 
+    fn scaled(x: FloatTensor<B>, a: f64) -> FloatTensor<B> {
+        let (dtype, shape) = (x.dtype(), x.shape());
+        let x = B::lender(x);
+        in_precision!(dtype, T => {
+            let a = T::of(a);
+            B::tensor(slices::map(B::values::<T>(&x), |x| a * x), shape)
+        })
+    }
+
     fn spectral_filter(x: FloatTensor<B>, filter: SpectralFilter) -> FloatTensor<B> {
         let (dtype, shape) = (x.dtype(), x.shape());
         let x = B::lender(x);
@@ -151,6 +160,10 @@ impl<B: Host> VectorOps for B {
             Motion::Straight(alpha) => changed!(x, y, |x: &mut [T], y| {
                 let alpha = T::of(alpha);
                 slices::zip_apply(x, y, |x, y| x + alpha * y);
+            }),
+            Motion::Combined(a, b) => changed!(x, y, |x: &mut [T], y| {
+                let (a, b) = (T::of(a), T::of(b));
+                slices::zip_apply(x, y, |x, y| a * x + b * y);
             }),
             Motion::Retracted(t) => mapped::<B>(x, y, |u, p| profile::retracted(u, t * p)),
             Motion::Extrapolated(factor) => mapped::<B>(x, y, |u, previous| {

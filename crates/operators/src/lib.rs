@@ -21,9 +21,10 @@
 //! |---|---|---|
 //! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel `c_b = sum_a g_a x_{a+b}` |
 //! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`) | itself with `adjoint` flipped |
+//! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` there, along one axis `e` | its transpose |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
-//! | [`inner_product`], [`add_scaled`], [`update_on_host`] | `sum a b`, `x + alpha y`, work on the host | none (iterative solvers) |
+//! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`], [`update_on_host`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y`, work on the host | none (iterative solvers) |
 //! | [`retract`], [`extrapolate`] | motions in the variable `atanh u` | none (line searches) |
 //!
 //! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
@@ -73,7 +74,7 @@ mod table;
 mod tensor;
 mod vector;
 
-pub use brick_convolution::convolution_of_outside;
+pub use brick_convolution::{convolution_of_outside, pass_of_outside};
 pub use convolution::kernel_symbol;
 pub use device::{ComputeDevice, DeviceKind};
 pub use error::Error;
@@ -83,10 +84,10 @@ pub use interpolation::Interpolation;
 pub use ops::{GridOps, Operation};
 pub use rules::extensions;
 pub use table::{COEFFICIENTS, HermiteTable, TableRange};
-pub use tensor::{brick_convolution, circular_convolution, tabulated};
+pub use tensor::{brick_convolution, brick_pass, circular_convolution, tabulated};
 pub use vector::{
-    HostUpdate, Motion, SharedUpdate, VectorOps, add_scaled, extrapolate, inner_product, retract,
-    spectral_filter, update_on_host,
+    HostUpdate, Motion, SharedUpdate, VectorOps, add_scaled, combined, extrapolate, inner_product,
+    retract, scaled, spectral_filter, update_on_host,
 };
 
 /// Reproducible numbers in `[-1/2, 1/2)`.

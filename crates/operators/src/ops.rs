@@ -23,10 +23,35 @@ pub enum Operation<B: Backend> {
     /// `sum_a g_a x_{a+b}`, of `x` and `g`, for all offsets `b` of a kernel of this width and number of axes; also summed over leading
     /// batch axes. The derivative of the convolution by its kernel.
     Correlation(FloatTensor<B>, FloatTensor<B>, usize, usize),
-    /// [`crate::brick_convolution`] of a field with taps, given the neighbours; its adjoint if so said.
-    Bricks(FloatTensor<B>, FloatTensor<B>, FloatTensor<B>, bool),
+    /// [`crate::brick_convolution`] of a field with taps, given the neighbours, or one pass of it.
+    Bricks(FloatTensor<B>, FloatTensor<B>, FloatTensor<B>, Passes),
     /// [`crate::tabulated`], of this order, at every entry of a grid, by the coefficients of a table.
     Tabulated(FloatTensor<B>, FloatTensor<B>, TableRange, usize),
+}
+
+/// The passes of a convolution on bricks.
+#[derive(Clone, Copy, Debug)]
+pub struct Passes {
+    /// The axis of the only pass, if there is one pass and not one along each axis.
+    pub axis: Option<usize>,
+    /// Whether it is the transpose: the opposite order with mirrored taps.
+    pub adjoint: bool,
+}
+
+impl Passes {
+    /// The axes of the passes in their order, of so many.
+    pub(crate) fn order(self, axes: usize) -> Vec<usize> {
+        match (self.axis, self.adjoint) {
+            (Some(axis), _) => vec![axis],
+            (None, true) => (0..axes).collect(),
+            (None, false) => (0..axes).rev().collect(),
+        }
+    }
+
+    pub(crate) fn transposed(self) -> Self {
+        let adjoint = !self.adjoint;
+        Self { adjoint, ..self }
+    }
 }
 
 /// Operations on grids, closed under differentiation in both modes.
@@ -53,8 +78,9 @@ impl GridOps for CaptureBackend {
                 let scalars = vec![count(width), count(axes)];
                 return captured(CORRELATION, vec![x, g], vec![width; axes].into(), scalars);
             }
-            Bricks(x, taps, neighbours, adjoint) => {
-                let scalars = vec![ScalarIr::Bool(adjoint)];
+            Bricks(x, taps, neighbours, Passes { axis, adjoint }) => {
+                let mut scalars = vec![ScalarIr::Bool(adjoint)];
+                scalars.extend(axis.map(count));
                 (BRICKS, vec![x, taps, neighbours], scalars)
             }
             Tabulated(w, table, TableRange { low, high, cells }, order) => {
@@ -95,14 +121,14 @@ impl<B: Backend + GridOps, C: CheckpointStrategy> GridOps for Autodiff<B, C> {
                 let to_g = move |c| B::grid(Convolution(x.clone(), c, false));
                 on_tape::<B, C, 2>(nodes, y, [Pullback::new(to_x), Pullback::new(to_g)])
             }
-            Bricks(x, taps, neighbours, adjoint) => {
+            Bricks(x, taps, neighbours, passes) => {
                 let (node, x) = (x.node(), x.into_primitive());
                 // Taps and neighbours are data, not variables.
                 let (taps, neighbours) = (taps.into_primitive(), neighbours.into_primitive());
                 let run =
-                    move |x, adjoint| B::grid(Bricks(x, taps.clone(), neighbours.clone(), adjoint));
-                let y = run(x, adjoint);
-                let to_x = move |g| run(g, !adjoint);
+                    move |x, passes| B::grid(Bricks(x, taps.clone(), neighbours.clone(), passes));
+                let y = run(x, passes);
+                let to_x = move |g| run(g, passes.transposed());
                 on_tape::<B, C, 1>([node], y, [Pullback::new(to_x)])
             }
             Tabulated(w, table, range, order) => {

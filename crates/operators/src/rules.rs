@@ -3,7 +3,7 @@
 use burn_ir::{BackendIr, CustomOpIr, ScalarIr, TensorIr};
 use linearize::{Builder, CustomOpRegistry, Error, Extensions, Tangents, multilinear};
 
-use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, Operation, TABULATED};
+use crate::ops::{BRICKS, CONVOLUTION, CORRELATION, GridOps, Operation, Passes, TABULATED};
 use crate::table::TableRange;
 
 /// `d F^(k)(w) = F^(k+1)(w) dw`; the table is constant.
@@ -48,7 +48,13 @@ fn register<B: BackendIr + GridOps>(registry: &mut CustomOpRegistry<B>) {
         B::grid(Operation::Correlation(x, g, count(&s[0]), count(&s[1])))
     });
     registry.register_function(BRICKS, move |[x, taps, neighbours], s| {
-        B::grid(Operation::Bricks(x, taps, neighbours, flag(&s[0])))
+        let (adjoint, axis) = (flag(&s[0]), s.get(1).map(count));
+        B::grid(Operation::Bricks(
+            x,
+            taps,
+            neighbours,
+            Passes { axis, adjoint },
+        ))
     });
     registry.register_function(TABULATED, move |[w, table], s| {
         let (low, high, cells) = (s[1].elem(), s[2].elem(), count(&s[3]));

@@ -47,6 +47,13 @@ pub(crate) fn sum<T: Real>(a: &[T]) -> f64 {
     sums.iter().sum::<f64>() + rest.iter().map(|x| x.double()).sum::<f64>()
 }
 
+/// `f(a_i)`
+pub(crate) fn map<T: Real>(a: &[T], f: impl Fn(T) -> T + Sync) -> Vec<T> {
+    let mut result = vec![T::zero(); a.len()];
+    zip_apply(&mut result, a, |_, a| f(a));
+    result
+}
+
 /// `a_i <- f(a_i, b_i)`
 pub fn zip_apply<T: Real>(a: &mut [T], b: &[T], f: impl Fn(T, T) -> T + Sync) {
     over_chunks(a, b, &|a, b| {

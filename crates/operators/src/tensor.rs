@@ -3,7 +3,7 @@
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
-use crate::ops::{GridOps, Operation};
+use crate::ops::{GridOps, Operation, Passes};
 use crate::table::TableRange;
 
 fn grid<const R: usize>(operation: Operation<Dispatch>) -> Tensor<R> {
@@ -34,9 +34,40 @@ pub fn brick_convolution<const D: usize>(
     neighbours: Tensor<2>,
     adjoint: bool,
 ) -> Tensor<D> {
+    let passes = Passes {
+        axis: None,
+        adjoint,
+    };
+    on_bricks(x, taps, neighbours, passes)
+}
+
+/// The only pass of a [`brick_convolution`] along one axis: `y_a = sum_b t_b x_{a + b e}`, `e` the unit vector of the axis.
+pub fn brick_pass<const D: usize>(
+    x: Tensor<D>,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+    axis: usize,
+) -> Tensor<D> {
+    let passes = Passes {
+        axis: Some(axis),
+        adjoint: false,
+    };
+    on_bricks(x, taps, neighbours, passes)
+}
+
+fn on_bricks<const D: usize>(
+    x: Tensor<D>,
+    taps: Tensor<1>,
+    neighbours: Tensor<2>,
+    passes: Passes,
+) -> Tensor<D> {
     let (taps, neighbours) = (taps.into_dispatch(), neighbours.into_dispatch());
-    let operation = Operation::Bricks(x.into_dispatch(), taps, neighbours, adjoint);
-    grid(operation)
+    grid(Operation::Bricks(
+        x.into_dispatch(),
+        taps,
+        neighbours,
+        passes,
+    ))
 }
 
 /// `F^(order)(w)` entry by entry, `F` given by the coefficients `[cells, 6]` of a [`crate::HermiteTable`].

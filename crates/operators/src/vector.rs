@@ -105,6 +105,8 @@ impl SharedUpdate {
 pub enum Motion {
     /// [`add_scaled`], by this factor.
     Straight(f64),
+    /// [`combined`], with these factors of both.
+    Combined(f64, f64),
     /// [`retract`], by this factor.
     Retracted(f64),
     /// [`extrapolate`], by this factor.
@@ -120,6 +122,8 @@ pub enum Motion {
 pub trait VectorOps: Backend {
     /// `sum a b`, shape `[1]`; accumulated and returned in double precision on a CPU.
     fn inner_product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// `a x`
+    fn scaled(x: FloatTensor<Self>, a: f64) -> FloatTensor<Self>;
     /// [`spectral_filter`] on primitives.
     fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
     /// A vector moved by another.
@@ -144,9 +148,22 @@ pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) ->
     Tensor::from_dispatch(<Dispatch as VectorOps>::spectral_filter(x, filter))
 }
 
+/// `a x`
+pub fn scaled<const R: usize>(x: &Tensor<R>, a: f64) -> Tensor<R> {
+    Tensor::from_dispatch(<Dispatch as VectorOps>::scaled(
+        x.clone().into_dispatch(),
+        a,
+    ))
+}
+
 /// `x + alpha y`, in place on a CPU if nobody else holds `x`.
 pub fn add_scaled<const R: usize>(x: Tensor<R>, y: &Tensor<R>, alpha: f64) -> Tensor<R> {
     moved(x, y, Motion::Straight(alpha))
+}
+
+/// `a x + b y`, in place on a CPU if nobody else holds `x`.
+pub fn combined<const R: usize>(x: Tensor<R>, a: f64, y: &Tensor<R>, b: f64) -> Tensor<R> {
+    moved(x, y, Motion::Combined(a, b))
 }
 
 /// A phase field `u` moved along `p`: in `atanh u`, which is the distance, where the interface is, straight elsewhere.

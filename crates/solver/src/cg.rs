@@ -1,7 +1,7 @@
 //! Truncated, preconditioned conjugate gradients.
 
 use burn::tensor::{DType, Tensor};
-use operators::{ComputeDevice, add_scaled, inner_product};
+use operators::{ComputeDevice, add_scaled, inner_product, scaled};
 
 use crate::Error;
 
@@ -85,7 +85,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         let alpha = rz / curvature;
         solution = Some(match solution {
             Some(p) => add_scaled(p, &direction, alpha),
-            None => direction.clone() * alpha,
+            None => scaled(&direction, alpha),
         });
         residual = add_scaled(residual, &image, -alpha);
         let z = precondition(&residual);

@@ -1,4 +1,11 @@
-//! Willmore flow of phase fields by minimizing movements, with any step of mean curvature flow inside.
+//! Willmore flow of phase fields by minimizing movements, with any step of mean curvature flow inside. A time step $`\tau`$ from $`u_k`$ minimizes
+//!
+//! ```math
+//! e[u] = \varepsilon \int |u - u_k|^2 + \frac{\tau \varepsilon}{\tilde\tau^2} \int |v[u] - u|^2
+//! ```
+//!
+//! with a step $`v[u]`$ of mean curvature flow of the size $`\tilde\tau`$ and interfaces of the width $`\varepsilon`$ (Franken, Rumpf and Wirth;
+//! Rumpf, Sassen and Smoch).
 //!
 //! ```
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};

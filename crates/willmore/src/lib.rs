@@ -1,4 +1,10 @@
-//! Willmore flow, the `L2` gradient flow of the bending energy `1/2 int kappa^2`, of curves and surfaces that are the zero sets of phase fields.
+//! Willmore flow of curves and surfaces that are the zero sets of phase fields: the $`L^2`$ gradient flow of the bending energy
+//!
+//! ```math
+//! w[\Gamma] = \frac{1}{2} \int_\Gamma \kappa^2 \, dA
+//! ```
+//!
+//! with the sum of the principal curvatures $`\kappa`$.
 //!
 //! ```
 //! use willmore::prelude::*;

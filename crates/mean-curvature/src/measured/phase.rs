@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use burn::tensor::{DType, Tensor};
 use geometry::{Bricks, Grid, Nodes};
 use linearize::Linearization;
-use operators::{ComputeDevice, SpectralFilter, Transform, add_scaled, spectral_filter};
+use operators::{ComputeDevice, SpectralFilter, Transform, combined, scaled, spectral_filter};
 
 use super::derivative::{Derivative, trace};
 use crate::{Error, MeanCurvatureStep, PhaseInverse, PhaseInverses};
@@ -151,19 +151,19 @@ fn on_bricks<const D: usize>(
     if D == 2 || !symmetric {
         return Ok(Arc::new(move |stiffness| {
             let x = symbols.constant(stiffness);
-            Arc::new(move |r: &Tensor<D>| r.clone() * x) as PhaseInverse<D>
+            Arc::new(move |r: &Tensor<D>| scaled(r, x)) as PhaseInverse<D>
         }));
     }
     let derivative = Arc::new(AtRest::new(step, nodes, bricks, device)?);
     Ok(Arc::new(move |stiffness| {
         let Some([x, y]) = symbols.polynomial(stiffness) else {
             let x = symbols.constant(stiffness);
-            return Arc::new(move |r: &Tensor<D>| r.clone() * x) as PhaseInverse<D>;
+            return Arc::new(move |r: &Tensor<D>| scaled(r, x)) as PhaseInverse<D>;
         };
         let derivative = derivative.clone();
         Arc::new(move |r: &Tensor<D>| {
             let image = derivative.product(r);
-            add_scaled(r.clone() * x, &image, y)
+            combined(image, y, r, x)
         })
     }))
 }

@@ -7,18 +7,18 @@ use burn_cubecl::tensor::CubeTensor;
 use cubecl::prelude::*;
 
 use super::launch::{like, threads_for, values};
+use crate::ops::Passes;
 
-/// See [`crate::brick_convolution`]: one launch for each axis.
+/// See [`crate::brick_convolution`]: one launch for each pass.
 pub(crate) fn brick_convolution(
     mut x: CubeTensor,
     taps: &CubeTensor,
     neighbours: &CubeTensor,
-    adjoint: bool,
+    passes: Passes,
 ) -> CubeTensor {
     let shape = x.shape();
     let (axes, side) = (shape.num_dims(), shape[shape.num_dims() - 1]);
-    for pass in 0..axes {
-        let axis = if adjoint { pass } else { axes - 1 - pass };
+    for axis in passes.order(axes) {
         let result = like(&x);
         let (client, dtype) = (x.client.clone(), x.dtype);
         let (count, threads) = threads_for(&client, shape.num_elements());
@@ -37,7 +37,7 @@ pub(crate) fn brick_convolution(
             side,
             side.pow(axes as u32),
             taps.shape()[0],
-            adjoint,
+            passes.adjoint,
             dtype_to_storage_type(dtype),
         );
         x = result;

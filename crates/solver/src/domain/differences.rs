@@ -1,17 +1,15 @@
 //! Convolutions and differences of stored values, as Burn graphs.
 
-use std::ops::Range;
-
-use burn::tensor::{Int, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use geometry::{Bricks, Error, require};
-use operators::{brick_convolution, circular_convolution, convolution_of_outside};
+use operators::{
+    brick_convolution, brick_pass, circular_convolution, convolution_of_outside, pass_of_outside,
+};
 
 use super::Domain;
 
 /// The first derivative by central differences of eighth order: weights of the neighbours after the node, minus those of the ones before.
 const FIRST_DIFFERENCE: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
-/// How far it reaches.
-const REACH: usize = FIRST_DIFFERENCE.len();
 /// The second derivative by central differences of eighth order: weights of the node and of its neighbours.
 const SECOND_DIFFERENCE: [f64; 5] = [
     -205.0 / 72.0,
@@ -20,7 +18,7 @@ const SECOND_DIFFERENCE: [f64; 5] = [
     8.0 / 315.0,
     -1.0 / 560.0,
 ];
-/// Width of the kernel of the Laplacian.
+/// How many weights both have from end to end.
 const WIDTH: usize = 2 * SECOND_DIFFERENCE.len() - 1;
 /// Part of a second difference in the two [products](BrickLaplacian) whose difference is the Laplacian on bricks.
 const SMALL: f64 = 1.0 / 128.0;
@@ -54,7 +52,7 @@ impl<const D: usize> Domain<D> {
     /// The gradient by central differences of eighth order, `sum_k w_k (u_{i+k} - u_{i-k}) / h` along each axis, periodic.
     ///
     /// # Panics
-    /// On grids of fewer than four cells per side.
+    /// On grids of fewer than nine cells per side.
     pub fn gradient(&self, u: &Tensor<D>) -> [Tensor<D>; D] {
         std::array::from_fn(|axis| self.derivative(u, axis))
     }
@@ -62,56 +60,20 @@ impl<const D: usize> Domain<D> {
     /// One component of the [gradient](Self::gradient).
     ///
     /// # Panics
-    /// On grids of fewer than four cells per side.
+    /// On grids of fewer than nine cells per side.
     pub fn derivative(&self, u: &Tensor<D>, axis: usize) -> Tensor<D> {
-        let extended = self.extended(u, axis);
-        let side = extended.dims()[2] - 2 * REACH;
-        let from = |start: usize| extended.clone().slice_dim(2, start..start + side);
-        let differences = FIRST_DIFFERENCE
-            .iter()
-            .zip(1..)
-            .map(|(weight, k)| (from(REACH + k) - from(REACH - k)) * (weight / self.spacing()));
-        let sum = differences.reduce(|sum, difference| sum + difference);
-        sum.expect("there are weights").reshape(self.shape())
-    }
-
-    /// The values as cubes, the whole grid or one brick each, `[cubes, cells before the axis, cells along it, cells after it]`, with those that
-    /// the first difference reaches beyond them.
-    fn extended(&self, u: &Tensor<D>, axis: usize) -> Tensor<4> {
-        let [count, side] = match self.nodes().bricks() {
-            Some(bricks) => [bricks.places().len(), bricks.side()],
-            None => [1, self.grid().cells()],
+        let (device, taps) = (u.device(), first_difference(self.spacing()));
+        let Some(bricks) = self.nodes().bricks() else {
+            let kernel = kernel_along::<D>(&taps, axis);
+            let kernel = self.constant(&kernel, [taps.len(); D], &device);
+            return circular_convolution(u.clone(), kernel, false);
         };
-        let [outer, inner] = [axis, D - 1 - axis].map(|axes| side.pow(axes as u32));
-        let cubes = u.clone().reshape([count, outer, side, inner]);
-        let beside = |layers: Range<usize>, column: usize| {
-            let faces = cubes.clone().slice_dim(2, layers);
-            match self.nodes().bricks() {
-                Some(bricks) => self.of_neighbours(faces, bricks, column),
-                None => faces,
-            }
-        };
-        let before = beside(side - REACH..side, 2 * axis);
-        let after = beside(0..REACH, 2 * axis + 1);
-        Tensor::cat(vec![before, cubes, after], 2)
-    }
-
-    /// For every brick the faces of its neighbour in this column of the table of neighbours, constant where that is not active.
-    fn of_neighbours(&self, faces: Tensor<4>, bricks: &Bricks<D>, column: usize) -> Tensor<4> {
-        let [count, outer, layers, inner] = faces.dims();
-        let device = faces.device();
-        let phase_values = self.constant(&self.phase_values(), [2, 1, 1, 1], &device);
-        let phase_values = phase_values.expand([2, outer, layers, inner]);
         let neighbours = bricks.neighbours();
-        let numbers = neighbours.iter().skip(column).step_by(2 * D);
-        // Behind the bricks lie the constants of the negative phase, -2 in the table, and of the positive one, -1.
-        let place = |number: &f64| match *number as i64 {
-            number if number < 0 => count as i64 + number + 2,
-            number => number,
-        };
-        let places: Vec<i64> = numbers.map(place).collect();
-        let places = Tensor::<1, Int>::from_data(TensorData::new(places, [count]), &device);
-        Tensor::cat(vec![faces, phase_values], 0).select(0, places)
+        let outside =
+            pass_of_outside::<D>(bricks.side(), &neighbours, &taps, axis, self.phase_values());
+        let outside = self.constant(&outside, bricks.shape(), &device);
+        let (taps, neighbours) = self.tables(&taps, &neighbours, &device);
+        brick_pass(u.clone(), taps, neighbours, axis) + outside
     }
 
     /// The Laplacian by central differences of eighth order, periodic. On bricks it is made of [convolutions](Self::convolve), in space up to
@@ -153,11 +115,15 @@ impl<const D: usize> Domain<D> {
 
     /// On bricks with this table of neighbours, without what the constants outside add.
     fn product(&self, u: &Tensor<D>, taps: &[f64], neighbours: &[f64]) -> Tensor<D> {
-        let device = u.device();
-        let taps = self.constant(taps, [taps.len()], &device);
-        let rows = neighbours.len() / (2 * D);
-        let neighbours = self.constant(neighbours, [rows, 2 * D], &device);
+        let (taps, neighbours) = self.tables(taps, neighbours, &u.device());
         brick_convolution(u.clone(), taps, neighbours, false)
+    }
+
+    /// Taps and table of neighbours as tensors.
+    fn tables(&self, taps: &[f64], neighbours: &[f64], device: &Device) -> (Tensor<1>, Tensor<2>) {
+        let rows = neighbours.len() / (2 * D);
+        let taps = self.constant(taps, [taps.len()], device);
+        (taps, self.constant(neighbours, [rows, 2 * D], device))
     }
 }
 
@@ -207,6 +173,16 @@ impl<'a, const D: usize> BrickLaplacian<'a, D> {
     }
 }
 
+/// The weights of a first difference from end to end, for this distance of the nodes.
+fn first_difference(spacing: f64) -> [f64; WIDTH] {
+    let mut taps = [0.0; WIDTH];
+    for (weight, k) in FIRST_DIFFERENCE.into_iter().zip(1..) {
+        taps[WIDTH / 2 + k] = weight / spacing;
+        taps[WIDTH / 2 - k] = -weight / spacing;
+    }
+    taps
+}
+
 /// The weights of a second difference from end to end.
 fn second_difference() -> [f64; WIDTH] {
     std::array::from_fn(|offset| SECOND_DIFFERENCE[offset.abs_diff(WIDTH / 2)])
@@ -222,15 +198,25 @@ fn product_kernel<const D: usize>(taps: &[f64]) -> Vec<f64> {
     })
 }
 
+/// Row-major kernel of these taps along one axis.
+fn kernel_along<const D: usize>(taps: &[f64; WIDTH], axis: usize) -> Vec<f64> {
+    let stride = |axis: usize| WIDTH.pow((D - 1 - axis) as u32);
+    let first = (0..D).filter(|&other| other != axis);
+    let first = first.map(|other| WIDTH / 2 * stride(other)).sum::<usize>();
+    let mut kernel = vec![0.0; WIDTH.pow(D as u32)];
+    for (offset, tap) in taps.iter().enumerate() {
+        kernel[first + offset * stride(axis)] = *tap;
+    }
+    kernel
+}
+
 /// Row-major kernel of minus the sum of second differences along the axes.
 fn negative_laplacian<const D: usize>(spacing: f64) -> Vec<f64> {
-    let centre = WIDTH / 2;
+    let taps = second_difference().map(|weight| -weight / (spacing * spacing));
     let mut kernel = vec![0.0; WIDTH.pow(D as u32)];
-    let middle = centre * (0..D).map(|axis| WIDTH.pow(axis as u32)).sum::<usize>();
     for axis in 0..D {
-        let stride = WIDTH.pow(axis as u32);
-        for (offset, weight) in second_difference().into_iter().enumerate() {
-            kernel[middle + offset * stride - centre * stride] -= weight / (spacing * spacing);
+        for (sum, weight) in kernel.iter_mut().zip(kernel_along::<D>(&taps, axis)) {
+            *sum += weight;
         }
     }
     kernel
