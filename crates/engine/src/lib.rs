@@ -1,4 +1,4 @@
-//! Cases of Willmore flow and mean curvature flow, run and resumed by one loop over time steps.
+//! The loop over time steps of Willmore flow and mean curvature flow: it runs a case, and resumes it.
 //!
 //! ```
 //! use engine::{Case, Formulation, Operator, Run, Scales, StepRule};
@@ -27,19 +27,21 @@
 //! # }
 //! ```
 //!
-//! A program of one's own needs an optimized profile, which is not inherited from here: `cargo run --release`, or `opt-level = 3` under
-//! `[profile.dev]` and `[profile.dev.package."*"]` in its `Cargo.toml`. Without, each step takes many times as long.
+//! Your program needs an optimized profile: `cargo run --release`, or `opt-level = 3` under `[profile.dev]` and
+//! `[profile.dev.package."*"]` in its `Cargo.toml`. It does not inherit the profile of this workspace. Without optimization each step takes many
+//! times as long.
 //!
-//! A [`Case`] is everything that a result depends on: initial phase field, region, sizes that are held, operator, scales, time steps, stop rules, measures.
-//! A [`Run`] computes a case, by steps ([`Run::step`]) or to its end ([`Run::advance`]), and nothing else does. The solver knows nothing of files, progress or
-//! shapes; [observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk: one checkpoint
-//! holds the phase fields and all records, and a run that is resumed from it ends with the same bytes.
+//! A [`Case`] is everything that a result depends on: initial phase field, region, held perimeter and volume, operator, scales, time steps,
+//! stop rules, measures. Only a [`Run`] computes a case, step by step ([`Run::step`]) or to its end ([`Run::advance`]). The solver knows
+//! nothing of files, progress or shapes. [Observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk. One
+//! checkpoint holds the phase fields and all records. A run that is resumed from it ends with the same bytes.
 //!
-//! [`Run::step`] is the loop of a step: a [`Controller`] says the size, a [`Scheme`](solver::Scheme) makes a candidate, and the controller takes it or not.
-//! Parts of one's own are in [`Own`], [`Operator::own`], [`Measure::new`], and behind [`Observer`].
+//! [`Run::step`] makes one step in three parts. A [`Controller`] gives the size. A [`Scheme`](solver::Scheme) makes a candidate. The controller
+//! accepts the candidate, or asks for another one. Your own terms, schemes, controllers and stop rules go into [`Own`], an operator into
+//! [`Operator::own`], a measure into [`Measure::new`]. An [`Observer`] sees the run.
 //!
-//! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through as they are; functions that refuse something
-//! themselves say what.
+//! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through unchanged. A function that refuses an input itself
+//! says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

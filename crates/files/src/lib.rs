@@ -1,4 +1,4 @@
-//! Files that are either complete or absent.
+//! Atomic writing: a file is either complete or absent.
 //!
 //! ```
 //! # let folder = tempfile::tempdir().expect("a folder for temporary files");
@@ -8,13 +8,13 @@
 //! # Ok::<(), files::Error>(())
 //! ```
 //!
-//! - A file is written under a temporary name in its own folder, flushed to the disk and renamed;
-//!   then the folder is flushed. A reader, or a restart after a crash, sees the old file or the new
-//!   one, never a part.
-//! - Temporary names begin with [`TEMPORARY_PREFIX`], and nothing else does. They are removed when
-//!   writing fails; only a process that is killed, or a power failure, leaves them behind.
-//! - Everything that changes the disk goes through [`FileSystem`], so that tests can let every single
-//!   operation fail. Its errors are those of the operating system, of which [`Error`] says where they came from.
+//! - A file is written under a temporary name in its own folder, flushed to the disk and renamed.
+//!   Then the folder is flushed. A reader sees the old file or the new one, never a part. So does a
+//!   restart after a crash.
+//! - Only temporary names begin with [`TEMPORARY_PREFIX`]. Temporary files are removed when writing
+//!   fails. They stay only after a kill or a power failure.
+//! - All changes of the disk go through [`FileSystem`], so that tests can let every single operation
+//!   fail. An [`Error`] is an error of the operating system, with the operation and the path.
 //! - [`Number`] reads the numbers of binary formats.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]

@@ -1,5 +1,5 @@
-//! Plans of discrete Fourier transforms: the generic code of the libraries is compiled here, once, and not in every crate
-//! that transforms.
+//! Plans of discrete Fourier transforms. This crate compiles the generic code of the FFT libraries once. The crates that transform need not
+//! compile it again.
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
-//! Readers of files against changed files: they must not panic, hang, or take memory that the file does not back, and what they refuse they
-//! must explain in one line. A [`Fuzz`] has valid files, changes them in ways that damage and malice would, and measures every reading. For
-//! tests only.
+//! Tests of readers of files with damaged files. A reader must not panic, must not hang, and must not take more memory than the size of the
+//! file justifies. If it refuses a file, it must say why in one line. A [`Fuzz`] changes valid files, as damage or malice would, and measures
+//! every reading. For tests only.
 //!
 //! ```
 //! use fuzzing::{CountingAllocator, Fuzz, Limit};
@@ -21,15 +21,15 @@
 //!
 //! # How long
 //!
-//! A test run tries 2000 cases, always the same ones. Environment variables ask for more:
+//! A test run tries 2000 cases, the same ones in every run. Environment variables ask for more:
 //!
 //! | variable | meaning |
 //! |---|---|
 //! | `FUZZ_CASES` | number of cases of every test |
 //! | `FUZZ_SEED` | other cases, by a number |
-//! | `FUZZ_KEEP` | a folder: every case is stored there, by the name of its test, before it is read. What is found there after a process ended by itself (stack overflow, memory, time) is the reason. `NAME.slowest` is the file that took longest |
+//! | `FUZZ_KEEP` | a folder, where every case is stored before it is read, under the name of its test; after a crash (stack overflow, memory, time) it holds the case that caused the crash, and `NAME.slowest` is the file that took longest |
 //!
-//! All tests of this kind have `fuzzing` in their names; `scripts/test_long` runs a million cases of each.
+//! All tests of this kind have `fuzzing` in their names. `scripts/test_long` runs a million cases of each.
 
 mod change;
 mod fuzz;

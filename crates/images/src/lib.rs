@@ -1,4 +1,4 @@
-//! Images in and out of phase fields: image files, outlines, signed distances, drawings.
+//! Phase fields from images, and drawings of phase fields: image files, outlines, signed distances.
 //!
 //! ```
 //! use geometry::{Grid, Placement, phase_field};
@@ -43,17 +43,17 @@
 //!
 //! # Conventions
 //!
-//! - Pixels are stored row by row from the top. In the plane the second axis points upwards, and the side of a pixel is the unit: the
+//! - Pixels are stored row by row from the top. In the plane the second axis points upwards, and the side of a pixel is the unit. The
 //!   image fills `[0, width] x [0, height]` until a [`geometry::Placement`] puts it into the box of a
 //!   grid.
-//! - Grey values are compared and mixed as they are stored (sRGB), evenly spaced for the eye and not in light, because edges are blended
-//!   so by drawing programs. A pixel half covered by black on white has the value 0.5.
+//! - Grey values are compared and mixed as sRGB values, as they are stored, and not as light. Drawing programs blend edges in this way. A
+//!   pixel half covered by black on white has the value 0.5.
 //! - Distances are negative inside, phase fields positive. Curves have the inside on their left.
-//! - Outside an image, and outside the box of a grid, is outside: nothing is repeated.
+//! - Points beyond the image, or beyond the box of a grid, are outside of the shape. Images are not periodic.
 //! - Everything with a signed distance can be drawn: outlines, the interface of a field, the shapes
 //!   of [`geometry`] and their combinations.
-//! - Same input, same bytes, for any number of threads.
-//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+//! - The same input gives the same bytes, for any number of threads.
+//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -2,8 +2,8 @@
 //!
 //! Write a scalar function of tensors once, in ordinary Burn. This crate traces it together with its
 //! reverse-mode gradient, differentiates the recorded graph again in forward mode, and replays the
-//! result on a backend: `hvp = linearize(grad(E))`, forward over reverse. What depends on the point
-//! alone is computed once per point; what remains per direction is a short linear program.
+//! result on a backend: `hvp = linearize(grad(E))`, forward over reverse. Values that depend on the
+//! point alone are computed once per point. A short linear program remains for each direction.
 //!
 //! ```
 //! use burn::tensor::{DType, Device, Tensor, TensorData};
@@ -49,47 +49,52 @@
 //!
 //! # Conventions
 //!
-//! - *Variables* are differentiated, *parameters* are inputs held constant. Both may change at every
-//!   call without tracing again; their shapes and element types may not. Numbers in the function are
-//!   part of the graph: make what changes a parameter.
+//! - *Variables* are differentiated. *Parameters* are inputs held constant. Both may change their values
+//!   at every call without tracing again, but not their shapes and element types. Numbers in the
+//!   function are part of the graph. A number that changes has to be a parameter.
 //! - [`Graph::gradient`] records value and gradient, so that [`Linearization::apply`] is a
 //!   Hessian-vector product. [`Graph::trace`] records any function, and `apply` is its
 //!   Jacobian-vector product.
-//! - Gradients are Burn's: derivatives by each element, without any inner product's weight.
-//! - Precision follows the variables. Say `(&device, DType::F64)` when creating tensors outside;
-//!   Burn casts to the device's default type otherwise. Inside a traced function,
-//!   [`Inputs::device`] has the right default, but methods named after `f32`, like `from_floats`, have
-//!   single precision before they reach it.
-//! - The traced function has no data to look at. Control flow that depends on values is not recorded:
+//! - Gradients are Burn's: derivatives by each element, without the weight of an inner product.
+//! - Precision follows the variables. Say `(&device, DType::F64)` when you create tensors outside.
+//!   Otherwise Burn casts to the device's default type. Inside a traced function,
+//!   [`Inputs::device`] has the right default. But methods named after `f32`, like `from_floats`,
+//!   round to single precision first.
+//! - The traced function sees no values. Control flow that depends on values is not recorded:
 //!   use masks. Piecewise functions have the derivative of the piece that a value is on.
-//! - Burn's `detach` stops Burn's gradient, but the gradient that results is differentiated as it is.
+//! - Burn's `detach` acts on Burn's gradient only. The linearization differentiates the resulting
+//!   gradient, without any further `detach`.
 //! - Nothing here checks for NaN or infinity.
 //!
 //! # What happens
 //!
 //! [`Graph::linearize`] shares common subexpressions, removes products with ones and sums with zeros,
-//! and never spreads a number over a grid. Tangents stay sums of *coefficient times tangent* as long as
-//! operations are elementwise, so that pointwise second derivatives merge into one coefficient that is
-//! computed once per point. [`Program::statistics`] counts what is left. Last uses are known, so backends compute
-//! in place, and between [`at`](Linearization::at) and [`apply`](Linearization::apply) only what the
-//! tangent program reads is kept. Backends with a handler for [`ELEMENTWISE`] run elementwise operations gathered, a pass over memory
-//! for many of them. [`Graph::linearize`] runs the products in another precision than values and
-//! gradients if asked to.
+//! and keeps a constant as one number instead of a grid of equal numbers. As long as operations are
+//! elementwise, a tangent stays a sum of *coefficient times tangent*. So pointwise second derivatives
+//! merge into one coefficient, which is computed once per point. [`Program::statistics`] counts the
+//! remaining operations. If asked to, [`Graph::linearize`] runs the products in another precision than
+//! values and gradients.
+//!
+//! The program knows the last use of every value, so backends compute in place. Between
+//! [`at`](Linearization::at) and [`apply`](Linearization::apply) it keeps only the values that the
+//! tangent program reads. Backends with a handler for [`ELEMENTWISE`] run many elementwise operations
+//! in one pass over memory.
 //!
 //! Rules cover arithmetic with broadcasting, elementary functions, reductions, matrix products,
-//! convolutions and linear layers with their backward passes, indexing, masks, and what Burn's autodiff
-//! makes of them. An operation that a tangent reaches and no rule covers is [`Error::NoRule`]. Custom
-//! operations bring a [`Rule`] and handlers for each backend in [`Extensions`].
+//! convolutions and linear layers with their backward passes, indexing, masks, and the operations in
+//! Burn's gradients of these. If a tangent reaches an operation without a rule, the error is
+//! [`Error::NoRule`]. Custom operations bring a [`Rule`] and handlers for each backend in
+//! [`Extensions`].
 //!
 //! # Checks
 //!
-//! [`taylor`] tests derivatives by the decay of Taylor remainders; [`dual`] computes Hessian-vector
-//! products in another way, reverse over forward. Both serve a user's own energies as well.
+//! [`taylor`] tests derivatives by the decay of Taylor remainders. [`dual`] computes Hessian-vector
+//! products in another way, reverse over forward. Both work for your own energies, too.
 //!
 //! # Features
 //!
 //! `flex` (default) and `ndarray` run on the CPU in double or single precision, `wgpu` and `cuda` on
-//! GPUs; each alone is enough. Double precision on `wgpu` is wrong in Burn 0.22.1.
+//! GPUs. One of them is enough. Double precision on `wgpu` is wrong in Burn 0.22.1.
 
 #[cfg(not(any(
     feature = "flex",

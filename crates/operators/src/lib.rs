@@ -19,19 +19,30 @@
 //!
 //! | operation | formula | derivative |
 //! |---|---|---|
+<<<<<<< HEAD
 //! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | itself with `adjoint` flipped; in the kernel `c_b = sum_a g_a x_{a+b}` |
 //! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`) | itself with `adjoint` flipped |
 //! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` there, along one axis `e` | its transpose |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | itself with `k + 1` |
+=======
+//! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | by `x`: the same operation with `adjoint` flipped; by `K`: `c_b = sum_a g_a x_{a+b}` for the gradient `g` of the output |
+//! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`) | the same operation with `adjoint` flipped |
+//! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | the same operation with `k + 1` |
+>>>>>>> 0a878c10 (Front pages of the crates in sentences of one thought)
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
 //! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`], [`update_on_host`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y`, work on the host | none (iterative solvers) |
 //! | [`retract`], [`extrapolate`] | motions in the variable `atanh u` | none (line searches) |
 //!
-//! Conventions: grids are row-major, the last axis fastest; a kernel has the same odd width on every axis and its
-//! centre in the middle; leading axes beyond the kernel's are a batch. The CPU backends (`flex`, `ndarray`) compute in
-//! the tensor's own precision, `f64` unless asked otherwise, by real FFTs of any length (realfft, rustfft). On a GPU the
-//! operations are CubeCL kernels or composed of Burn's, in `f32` on `wgpu` and usually in `f64` on `cuda`. The same input gives the same bytes on a CPU, whatever
-//! the number of threads.
+//! # Conventions
+//!
+//! - Grids are row-major, the last axis fastest.
+//! - A kernel has the same odd width on every axis, and its centre is in the middle. If a tensor has more axes than the kernel, the leading
+//!   ones are a batch.
+//! - The CPU backends (`flex`, `ndarray`) compute in the tensor's own precision, `f64` unless asked otherwise. They use real FFTs of any length
+//!   (realfft, rustfft).
+//! - On a GPU the operations are CubeCL kernels, or composed of Burn's operations. They compute in `f32` on `wgpu`, and usually in `f64` on
+//!   `cuda`.
+//! - On a CPU the same input gives the same bytes, for any number of threads.
 
 // Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.
 #![cfg_attr(feature = "ndarray", allow(deprecated))]

@@ -1,4 +1,4 @@
-//! Pages to look at: figures, tables, picture sequences and surfaces to turn in one HTML file.
+//! HTML pages in one file: figures, tables, sequences of pictures, and surfaces that can be turned.
 //!
 //! ```
 //! use pages::{Facts, ImageElement, Page, Section, TableElement, View, viewer};
@@ -32,17 +32,16 @@
 //!
 //! # Conventions
 //!
-//! - A page works from a disk, from a server and from a mail; it asks the network for nothing.
-//! - Whatever text comes in is text, never markup, but for [`markdown`] and the cells of tables
-//!   in Markdown, which cannot bring in scripts or pictures.
-//! - Without JavaScript everything but turning and playing is there: sequences are strips, surfaces
-//!   are pictures. Everything can be reached by keyboard and has a text for those who cannot see
-//!   it.
-//! - Pictures lie on white, also where the page is dark: figures are drawn for paper.
+//! - A page works from a disk, from a server and from a mail. It asks the network for nothing.
+//! - Text is shown as text and never read as markup. Only [`markdown`] and the cells of tables in
+//!   Markdown are read as markup. They cannot bring in scripts or pictures.
+//! - Without JavaScript, sequences are strips and surfaces are pictures. Everything can be reached by
+//!   keyboard, and every picture has a text for readers who cannot see it.
+//! - Pictures have a white background, also on a dark page: figures are drawn for paper.
 //! - The same input gives the same bytes.
-//! - A page opened as `page.html#check` starts everything on it and says in the attribute
-//!   `data-check` of its root what did not work; `scripts/check_pages` reads that.
-//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+//! - A page opened as `page.html#check` starts everything on it, and lists failures in the attribute
+//!   `data-check` of its root. `scripts/check_pages` reads this attribute.
+//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

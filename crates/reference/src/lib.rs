@@ -1,12 +1,12 @@
-//! Exact flows and equilibria of curves and of surfaces of revolution, to compare other methods with. No phase fields are used.
+//! Exact flows and equilibria of curves and of surfaces of revolution, as references for other methods. They do not use phase fields.
 //!
 //! - [`planar`]: Willmore flow and curve shortening of plane curves, also of polygons, to about 1e-8 of their size.
 //! - [`revolution`]: Willmore and mean curvature flow of spheres, disks, tori and other surfaces of revolution, to about 1e-6.
 //! - [`equilibria`]: axisymmetric vesicles of given area and volume, and closed elastic curves of given length and area.
 //!
-//! Curves are counterclockwise, with the curvature `kappa` of a circle positive; surfaces have the sum of their principal
-//! curvatures for `kappa`, positive on spheres. The energy is `1/2 int kappa^2`, `8 pi` for spheres. [`Flow`] states
-//! the normal velocities; time is that of the `L2` gradient flow. Coordinates and times have any consistent units.
+//! Curves are counterclockwise, and the curvature `kappa` of a circle is positive. On surfaces `kappa` is the sum of the principal
+//! curvatures, positive on spheres. The energy is `1/2 int kappa^2`, `8 pi` for spheres. [`Flow`] states the normal velocities. Time is the
+//! time of the `L2` gradient flow. Coordinates and times have any consistent units.
 
 mod corner;
 mod curve;

@@ -39,15 +39,15 @@
 //!
 //! # Conventions
 //!
-//! - The solid is where `u > 0` inside the box of the grid. What lies beyond the box is outside: a picture repeats nothing.
-//! - Drawn are the triangles of [`surfaces::isosurface`] with normals that are interpolated, sorted
-//!   by depth for several samples of every pixel.
-//! - Ambient occlusion and shadows are those at the vertices. The directions of light are fixed:
-//!   same input, same bytes, on any number of threads.
+//! - The solid is where `u > 0` inside the box of the grid. Points beyond the box are outside of the solid. Pictures are not periodic.
+//! - The triangles of [`surfaces::isosurface`] are drawn with interpolated normals, and sorted by depth
+//!   for several samples of every pixel.
+//! - Ambient occlusion and shadows are computed at the vertices, for fixed directions of light.
 //! - Lights are fixed to the camera, so that every view is lit alike.
-//! - Light is computed and blended linearly; colours given and pixels returned are sRGB.
+//! - Light is computed and blended linearly. Given colours and returned pixels are sRGB.
+//! - The same input gives the same bytes, for any number of threads.
 //! - Angles are in degrees, lengths in the units of the surface, sizes of pictures in pixels.
-//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -1,7 +1,7 @@
 //! Plots, tables, summaries and run manifests from results.
 //!
-//! This crate knows results, not solvers: numbers come in, files come out. A figure is described
-//! once and drawn alike to SVG and PNG; files appear complete or not at all.
+//! This crate takes numbers and writes files. It does not depend on solvers. One description of a
+//! figure gives an SVG and a PNG that look alike. Files appear complete or not at all.
 //!
 //! ```
 //! use report::{Axis, Figure, LineChart, LineStyle, Manifest, Marker, OutputDir, Series, Summary};
@@ -32,18 +32,18 @@
 //!
 //! # Conventions
 //!
-//! - Points are `[x, y]`, `y` pointing up. Arrays are row-major with the last axis fastest; axis 0
+//! - Points are `[x, y]`, `y` pointing up. Arrays are row-major with the last axis fastest. Axis 0
 //!   is drawn to the right, axis 1 upwards.
-//! - Sizes are in layout units: one CSS pixel in SVG, two pixels in PNG. Figures are 800 units wide
-//!   unless told otherwise, made to be read at that width.
+//! - Sizes are in layout units: one CSS pixel in SVG, two pixels in PNG. By default figures are 800
+//!   units wide, and are to be read at this width.
 //! - Colours come from the palette of Okabe and Ito ([`OKABE_ITO`]) and from viridis, both safe for the colour-blind.
 //! - Text is set in the embedded `DejaVu Sans` 2.37 (from the `dejavu` crate; Bitstream Vera
 //!   licence, changes in the public domain) in PNG, and in a sans-serif family in SVG. No system
 //!   font is used.
-//! - What cannot be shown (NaN, or zero on a logarithmic axis) is left out of pictures and
-//!   interrupts its curve; [`Summary`] and [`Table`] refuse it.
-//! - The same input gives the same bytes, manifests aside.
-//! - Every [`Error`] names what was refused; functions say what they refuse where their types do not.
+//! - A value that cannot be shown (NaN, or zero on a logarithmic axis) is left out of pictures, and its
+//!   curve is interrupted there. [`Summary`] and [`Table`] refuse such a value.
+//! - The same input gives the same bytes, except for manifests.
+//! - Every [`Error`] names the refused input. Functions say which inputs they refuse, unless the types do.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

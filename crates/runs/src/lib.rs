@@ -1,5 +1,5 @@
-//! Run directories that survive: whatever stops a computation, it goes on from the last commit and
-//! ends with the same bytes as if nothing had happened.
+//! Directories for long computations. A computation that was stopped in any way goes on from its last
+//! commit, and ends with the same bytes as without the stop.
 //!
 //! ```
 //! use runs::{CheckpointState, Error, RunDirectory};
@@ -37,26 +37,26 @@
 //! | name | content | written |
 //! |---|---|---|
 //! | `checkpoints/step-00000012.ckpt` | the state, and length and SHA-256 of every file that is written once | at each commit, the last two kept |
-//! | `config.toml`, `fields/`, … | whatever the caller writes | once |
-//! | `metrics.csv`, … | whatever the caller replaces at any time | at any time |
+//! | `config.toml`, `fields/`, … | files of the caller that do not change | once |
+//! | `metrics.csv`, … | files of the caller that change | at any time |
 //! | `lock` | nothing; locked while a process works here | once |
 //!
-//! Resuming removes checkpoints and temporary files that are no part of the run; files of others stay.
+//! Resuming removes checkpoints and temporary files that are no part of the run. Files of other programs stay.
 //!
 //! # What is promised
 //!
-//! - A checkpoint is the commit. Other files are written and flushed before it, so that it describes
-//!   a whole state of the run whenever the process dies. What it does not list was written after it,
-//!   and the computation of a resumed run writes it again.
-//! - A run that is a function of its [`CheckpointState`] ends with the same bytes in every file that is written once, however
-//!   often it was stopped: only the last checkpoint stays.
-//! - A bit that has flipped in one of those files is noticed when the run is opened, and the file named.
+//! - A checkpoint is the commit. Other files are written and flushed before it. So it describes a whole
+//!   state of the run, whenever the process dies. Files that it does not list were written after it. A
+//!   resumed run writes them again.
+//! - Let a run be a function of its [`CheckpointState`]. Then every file that is written once ends with the same bytes, however often the run
+//!   was stopped. At the end only the last checkpoint stays.
+//! - If a bit has flipped in a file that is written once, opening the run finds it, and the error names the file.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - Readers never trust a number in a file before its length agrees. They take up to four times the length of a checkpoint with
-//!   large arrays, and at most 320 times that of its notes (small maps).
+//! - A reader does not use a number from a file before it has checked the file's length against it. For a checkpoint with large arrays,
+//!   readers take memory of up to four times its length. For its notes (small maps) they take at most 320 times the length of the notes.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 //!
-//! Whatever touches files fails with [`Error::Io`]; other errors are named where they arise.
+//! Functions that read or write files can fail with [`Error::Io`]. Functions name other errors in their documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

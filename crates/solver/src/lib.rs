@@ -36,17 +36,17 @@
 //! # }
 //! ```
 //!
-//! [`MinimizingMovement`] is the energy of a step as a Burn graph: the gradient is Burn's autodiff, the Hessian-vector product its
-//! linearization ([`linearize`]), forward over reverse. The scheme, its calibration, the minimization ([`NewtonVariant::Preconditioned`]), the
-//! held sizes ([`Problem::hold`]) and the further terms of the energy ([`EnergyTerm`], [`Problem::set_energy`]) are explained in
-//! `docs/algorithm.md`.
+//! [`MinimizingMovement`] is the energy of a step as a Burn graph. Burn's autodiff computes the gradient, and [`linearize`] differentiates
+//! the gradient for Hessian-vector products. `docs/algorithm.md` explains the scheme, its calibration, the minimization
+//! ([`NewtonVariant::Preconditioned`]), held perimeter and volume ([`Problem::hold`]), and further terms of the energy ([`EnergyTerm`],
+//! [`Problem::set_energy`]).
 //!
 //! # Conventions
 //!
-//! Grids, norms and signs are those of [`geometry`]. Energies in [`StepRecord`] are in the paper's units with true L2 norms.
-//! Energies and gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step is known to about
-//! seven digits, so that a minimization can end with [`Exit::Precision`] before a tight tolerance. Errors of the device and of the crates below
-//! pass through as they are.
+//! [`geometry`] defines grids, norms and signs. Energies in [`StepRecord`] are in the paper's units with true L2 norms. Energies and
+//! gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step has about seven digits. So a
+//! minimization can end with [`Exit::Precision`] before it reaches a tight tolerance. Errors of the device and of the crates below pass
+//! through unchanged.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

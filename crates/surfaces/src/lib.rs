@@ -1,5 +1,5 @@
-//! Triangle meshes in and out of phase fields: files, closed surfaces, signed distances,
-//! isosurfaces.
+//! Phase fields from triangle meshes, and triangle meshes from phase fields: files, closed surfaces,
+//! signed distances, isosurfaces.
 //!
 //! ```
 //! use geometry::{Grid, Placement, optimal_profile, phase_field, shapes::Ball};
@@ -48,13 +48,13 @@
 //!
 //! - Faces are counter-clockwise seen from outside. Distances are negative inside, phase fields
 //!   positive.
-//! - A [`TriangleMesh`] may be anything; a [`ClosedMesh`] bounds a solid, and only that has a
+//! - A [`TriangleMesh`] may have any triangles. A [`ClosedMesh`] bounds a solid. Only a closed mesh has a
 //!   volume and a [`MeshDistance`].
 //! - Vertices and faces are counted from zero, lines of files from one.
-//! - Two kinds of isosurfaces: [`phase_field_surface`] is quick and has the symmetries of the field, for measurements and pictures;
-//!   [`remeshed_surface`] has well-shaped triangles, for files that other programs read.
+//! - There are two kinds of isosurfaces. [`phase_field_surface`] is quick and has the symmetries of the field, for measurements and
+//!   pictures. [`remeshed_surface`] has well-shaped triangles, for files that other programs read.
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
-//! - Same input, same bytes, for any number of threads.
+//! - The same input gives the same bytes, for any number of threads.
 
 mod closed;
 mod distance;

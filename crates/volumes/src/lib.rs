@@ -1,4 +1,4 @@
-//! Volumes of voxels, such as segmentations, as closed surfaces.
+//! Closed surfaces from volumes of voxels, such as segmentations.
 //!
 //! ```
 //! use volumes::{Inside, Volume, read, write};
@@ -40,11 +40,11 @@
 //!
 //! # Conventions
 //!
-//! - Voxels are counted from zero; the first axis runs fastest, as in the files. A volume says where the centres of voxels are, and all
-//!   surfaces are there, in the units of the file.
+//! - Voxels are counted from zero. The first axis runs fastest, as in the files. A volume has the coordinates of the centres of its voxels,
+//!   in the units of the file. Surfaces have the coordinates of their volume.
 //! - Faces are counter-clockwise seen from outside, also where the axes of the voxels are left-handed.
-//! - Same input, same bytes, for any number of threads.
-//! - Errors of the crates below pass through as they are; functions that refuse something themselves say what.
+//! - The same input gives the same bytes, for any number of threads.
+//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -23,8 +23,9 @@
 //! # }
 //! ```
 //!
-//! [`Willmore`] has the defaults that are good for most: the learned operator of the accurate recipe inside, calibrated; bricks near the
-//! surface where they are less than half of the grid; steps of second order, as long as their errors allow. Everything else is a method of it.
+//! [`Willmore`] has defaults for most flows: the inner step of mean curvature flow is the learned operator of the accurate recipe, calibrated.
+//! If the bricks near the surface are less than half of the grid, only they are stored. Time steps are of second order, and as long as their
+//! errors allow. The methods of [`Willmore`] change these defaults.
 //!
 //! # Parts of one's own
 //!
@@ -34,22 +35,32 @@
 //! | a step of mean curvature flow | [`MeanCurvatureStep`](mean_curvature::MeanCurvatureStep) | `examples/own_operator.rs` |
 //! | a network | [`MeanCurvatureStep`](mean_curvature::MeanCurvatureStep) | `examples/own_network.rs` |
 //! | a time scheme | [`Scheme`](solver::Scheme) | `examples/own_scheme.rs` |
-//! | what chooses the size of steps | [`Controller`](engine::Controller) | `examples/own_controller.rs` |
+//! | a controller of the time steps | [`Controller`](engine::Controller) | `examples/own_controller.rs` |
 //! | a stop rule | [`StopRule`](engine::StopRule) | `examples/own_stop.rs` |
 //! | a measure | [`Measure`](engine::Measure) | `examples/own_measure.rs` |
 //! | a shape | [`SignedDistance`](geometry::SignedDistance) | `examples/own_shape.rs` |
 //!
-//! Each is one file that imports the [`prelude`] and Burn; `docs/extending.md` explains them. With all of them a flow has what the loop offers: regions, held
-//! sizes, control of the steps, stop rules, measures, and checkpoints from which it goes on to the same bytes.
+//! Each part is one file that imports the [`prelude`] and Burn. `docs/extending.md` explains them. A flow with such parts has all features of the
+//! loop: regions, held perimeter and volume, control of the steps, stop rules, measures, and checkpoints. A run that is resumed from a checkpoint
+//! ends with the same bytes.
 //!
 //! # The crates
 //!
-//! This crate re-exports the ones it is made of: [`geometry`] (grids, distances, phase fields), [`linearize`] (forward mode for Burn), [`operators`] (devices and
-//! periodic operations), [`mean_curvature`] (the trait of the step inside, its calibration), [`model`] (learned operators), [`fem`] (finite elements), [`solver`] (one
-//! time step), [`engine`] (cases and the loop over steps), [`runs`] (run folders).
+//! This crate re-exports the crates that it is made of:
 //!
-//! A program of one's own needs an optimized profile, which is not inherited from here: `cargo run --release`, or `opt-level = 3` under
-//! `[profile.dev]` and `[profile.dev.package."*"]` in its `Cargo.toml`. Without, each step takes many times as long.
+//! - [`geometry`]: grids, distances, phase fields,
+//! - [`linearize`]: forward mode for Burn,
+//! - [`operators`]: devices and periodic operations,
+//! - [`mean_curvature`]: the trait of the inner step, its calibration,
+//! - [`model`]: learned operators,
+//! - [`fem`]: finite elements,
+//! - [`solver`]: one time step,
+//! - [`engine`]: cases and the loop over steps,
+//! - [`runs`]: run folders.
+//!
+//! Your program needs an optimized profile: `cargo run --release`, or `opt-level = 3` under `[profile.dev]` and
+//! `[profile.dev.package."*"]` in its `Cargo.toml`. It does not inherit the profile of this workspace. Without optimization each step takes many
+//! times as long.
 
 mod builder;
 pub mod prelude;
