@@ -14,7 +14,7 @@
 //! - Only temporary names begin with [`TEMPORARY_PREFIX`]. Temporary files are removed when writing
 //!   fails. They stay only after a kill or a power failure.
 //! - All changes of the disk go through [`FileSystem`], so that tests can let every single operation
-//!   fail. An [`Error`] is an error of the operating system, with the operation and the path.
+//!   fail. An [`Error`] has the failed operation, the path and the error of the operating system.
 //! - [`Number`] reads the numbers of binary formats.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]

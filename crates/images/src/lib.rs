@@ -46,7 +46,7 @@
 //! - Pixels are stored row by row from the top. In the plane the second axis points upwards, and the side of a pixel is the unit. The
 //!   image fills `[0, width] x [0, height]` until a [`geometry::Placement`] puts it into the box of a
 //!   grid.
-//! - Grey values are compared and mixed as sRGB values, as they are stored, and not as light. Drawing programs blend edges in this way. A
+//! - Grey values are compared and mixed as they are stored, in sRGB and not in linear light. Drawing programs blend edges in this way. A
 //!   pixel half covered by black on white has the value 0.5.
 //! - Distances are negative inside, phase fields positive. Curves have the inside on their left.
 //! - Points beyond the image, or beyond the box of a grid, are outside of the shape. Images are not periodic.

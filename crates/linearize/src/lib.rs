@@ -62,8 +62,8 @@
 //!   round to single precision first.
 //! - The traced function sees no values. Control flow that depends on values is not recorded:
 //!   use masks. Piecewise functions have the derivative of the piece that a value is on.
-//! - Burn's `detach` acts on Burn's gradient only. The linearization differentiates the resulting
-//!   gradient, without any further `detach`.
+//! - Burn's `detach` changes the gradient that Burn computes. The linearization then differentiates
+//!   this gradient, as if there were no `detach` in it.
 //! - Nothing here checks for NaN or infinity.
 //!
 //! # What happens

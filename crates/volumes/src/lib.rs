@@ -40,8 +40,8 @@
 //!
 //! # Conventions
 //!
-//! - Voxels are counted from zero. The first axis runs fastest, as in the files. A volume has the coordinates of the centres of its voxels,
-//!   in the units of the file. Surfaces have the coordinates of their volume.
+//! - Voxels are counted from zero. The first axis runs fastest, as in the files. A volume knows where the centres of its voxels are, in
+//!   the units of the file. Surfaces are in these coordinates.
 //! - Faces are counter-clockwise seen from outside, also where the axes of the voxels are left-handed.
 //! - The same input gives the same bytes, for any number of threads.
 //! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
