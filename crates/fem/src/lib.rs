@@ -28,45 +28,28 @@
 //!
 //! # Discretization
 //!
-<<<<<<< HEAD
-//! Multilinear (Q1) elements on the periodic grid, one code for two and three dimensions ([`element`]); consistent mass and
-//! stiffness; the double well $`\Psi(v) = \frac{9}{16} (1 - v^2)^2`$ is integrated exactly (three Gauss points per axis), but for the explicit
-//! term of the semi-implicit step, which is interpolated at the nodes. Linear systems
-//! are solved by conjugate gradients, preconditioned with the exact inverse in the pure phases by Fourier transforms: the
-//! spectrum of the preconditioned matrix lies between $`(1 - \frac{9}{8} s) / (1 + \frac{9}{4} s)`$ and 1 with $`s = \tilde\tau / \varepsilon^2`$, independent of the
-//! grid. [`LinearSolver::Direct`] is a sparse Cholesky factorization, in place of the direct solver (PARDISO) of the paper's comparison.
-//!
-//! # Derivatives
-//!
-//! The implicit step $`v[u]`$ solves
-//!
-//! ```math
-//! M (v - u) + \tilde\tau S v + \frac{\tilde\tau}{2 \varepsilon^2} b(v) = 0, \qquad b_i(v) = \int \Psi'(v) \, \varphi_i
-//! ```
-//!
-//! with mass matrix $`M`$, stiffness matrix $`S`$ and basis functions $`\varphi_i`$. With the derivative $`A(v)`$ of the left side in $`v`$,
-//! $`v'[u] \, p = A(v)^{-1} M p`$, and its transpose is $`M A(v)^{-1}`$; $`A(v)`$ depends on $`v`$ through $`\int v^2 \varphi_i \varphi_j`$. So all
-//! derivatives are compositions of five operations, closed under differentiation: the mass matrix, the inverse of
-//! $`M + \tilde\tau S`$, the symmetric product $`\int a b c \, \varphi_i`$, the step, and $`A(v)^{-1} g`$. Gradients come from Burn's autodiff,
-=======
 //! The elements are multilinear (Q1) on the periodic grid, with one code for two and three dimensions ([`element`]). Mass and stiffness
-//! matrices are consistent. The double well `Psi(v) = 9/16 (1 - v^2)^2` is integrated exactly (three Gauss points per axis). Only the
+//! matrices are consistent. The double well $`\Psi(v) = \frac{9}{16} (1 - v^2)^2`$ is integrated exactly (three Gauss points per axis). Only the
 //! explicit term of the semi-implicit step is interpolated at the nodes.
 //!
 //! Conjugate gradients solve the linear systems. Their preconditioner is the exact inverse in the pure phases, by Fourier transforms. With
-//! the width `eps` of the interface, the size `tautilde` of the step and `s = tautilde/eps^2`, the spectrum of the preconditioned matrix lies
-//! in `[(1 - 9/8 s)/(1 + 9/4 s), 1]`, independent of the grid. [`LinearSolver::Direct`] is a sparse Cholesky factorization. It stands for the
-//! direct solver (PARDISO) of the paper's comparison.
+//! the width $`\varepsilon`$ of the interface, the size $`\tilde\tau`$ of the step and $`s = \tilde\tau / \varepsilon^2`$, the spectrum of the
+//! preconditioned matrix lies between $`(1 - \frac{9}{8} s) / (1 + \frac{9}{4} s)`$ and 1, independent of the grid. [`LinearSolver::Direct`] is a
+//! sparse Cholesky factorization. It stands for the direct solver (PARDISO) of the paper's comparison.
 //!
 //! # Derivatives
 //!
-//! Let `phi_i` be the basis functions, `M` the mass matrix and `S` the stiffness matrix. The implicit step `v[u]` solves
-//! `M (v - u) + tautilde S v + tautilde / (2 eps^2) b(v) = 0` with `b_i(v) = int Psi'(v) phi_i`. Let `A(v)` be the derivative of the left side
-//! in `v`. It depends on `v` through `int v^2 phi_i phi_j`. Then `v'[u] p = A(v)^-1 M p`, and the transpose of `v'[u]` is `M A(v)^-1`.
+//! Let $`\varphi_i`$ be the basis functions, $`M`$ the mass matrix and $`S`$ the stiffness matrix. The implicit step $`v[u]`$ solves
+//!
+//! ```math
+//! M (v - u) + \tilde\tau S v + \frac{\tilde\tau}{2 \varepsilon^2} b(v) = 0, \qquad b_i(v) = \int \Psi'(v) \, \varphi_i .
+//! ```
+//!
+//! Let $`A(v)`$ be the derivative of the left side in $`v`$. It depends on $`v`$ through $`\int v^2 \varphi_i \varphi_j`$. Then
+//! $`v'[u] \, p = A(v)^{-1} M p`$, and the transpose of $`v'[u]`$ is $`M A(v)^{-1}`$.
 //!
 //! So all derivatives are compositions of five operations, which are closed under differentiation: the mass matrix, the inverse of
-//! `M + tautilde S`, the symmetric product `int a b c phi_i`, the step, and `A(v)^-1 g`. Gradients come from Burn's autodiff, and
->>>>>>> 0a878c10 (Front pages of the crates in sentences of one thought)
+//! $`M + \tilde\tau S`$, the symmetric product $`\int a b c \, \varphi_i`$, the step, and $`A(v)^{-1} g`$. Gradients come from Burn's autodiff, and
 //! Hessian-vector products from `linearize`.
 
 // Burn 0.22 deprecates its ndarray backend in favour of flex; it stays selectable here until it is gone.

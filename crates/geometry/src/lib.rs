@@ -38,27 +38,15 @@
 //! - A [`Grid`] is a periodic cube of side `L` with `N` cells per side and the spacing `h = L/N`. Its
 //!   `N^D` nodes are `origin + i h`, `i = 0..N-1`. The repeated last layer is not stored. Values are
 //!   ordered row-major, last axis fastest.
-<<<<<<< HEAD
-//! - Signed distances $`s`$ are negative inside. Phase fields are $`u = \tanh(-3 s / (4 \varepsilon))`$: positive
-//!   inside, zero on the interface, whose width is $`\varepsilon`$.
-//! - The double well is $`\Psi(v) = \frac{9}{16} (1 - v^2)^2`$ and the perimeter
-//!   $`P_\varepsilon[v] = \frac{1}{2} \int \varepsilon |\nabla v|^2 + \Psi(v) / \varepsilon`$, so that it equals length or area in
-//!   the limit.
+//! - Signed distances $`s`$ are negative inside. Phase fields are $`u = \tanh(-3 s / (4 \varepsilon))`$ with the
+//!   width $`\varepsilon`$ of the interface: positive inside, zero on the interface.
+//! - The double well is $`\Psi(v) = \frac{9}{16} (1 - v^2)^2`$. The perimeter is
+//!   $`P_\varepsilon[v] = \frac{1}{2} \int \varepsilon |\nabla v|^2 + \Psi(v) / \varepsilon`$. It equals length or area in the
+//!   limit of small $`\varepsilon`$.
 //! - The $`L^2`$ norm is $`(h^D \sum u^2)^{1/2}`$, an integral and not a mean.
-//! - Mean curvature is the sum of the principal curvatures; see [`exact`] for flows and energies.
-//! - Everything is generic over the dimension `D` unless it exists in one dimension only.
-//! - Same input, same bytes: parallel sums have a fixed order.
-=======
-//! - Signed distances `s` are negative inside. Phase fields are `u = tanh(-3 s / (4 eps))` with the
-//!   width `eps` of the interface: positive inside, zero on the interface.
-//! - The double well is `Psi(v) = 9/16 (1 - v^2)^2`. The perimeter is
-//!   `P_eps[v] = 1/2 integral of eps |grad v|^2 + Psi(v)/eps`. It equals length or area in the
-//!   limit of small `eps`.
-//! - The `L2` norm is `sqrt(h^D sum u^2)`, an integral and not a mean.
 //! - Mean curvature is the sum of the principal curvatures. [`exact`] has flows and energies.
 //! - Items are generic over the dimension `D`, unless they exist in one dimension only.
 //! - The same input gives the same bytes: parallel sums have a fixed order.
->>>>>>> 0a878c10 (Front pages of the crates in sentences of one thought)
 
 mod bricks;
 mod error;

@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-//! The learned mean-curvature operator $`V[u] = F(K * u)`$: network, training, quality, calibration, storage.
-=======
-//! The learned operator `V[u] = F(K * u)`, a step of mean curvature flow: network, training, quality, calibration, storage.
->>>>>>> 0a878c10 (Front pages of the crates in sentences of one thought)
+//! The learned operator $`V[u] = F(K * u)`$, a step of mean curvature flow: network, training, quality, calibration, storage.
 //! [`MeanCurvatureOperator`] is a [`mean_curvature::MeanCurvatureStep`].
 //!
 //! ```
@@ -30,19 +26,11 @@
 //!
 //! # The network
 //!
-<<<<<<< HEAD
-//! $`K`$ is a convolution kernel of odd width $`n_K`$ and $`F: \mathbb{R} \to \mathbb{R}`$ a perceptron `1-32-16-8-4-2-1` ([`Mlp`]), trained so that
-//! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
-//! 2022; the form used by Rumpf, Sassen and Smoch). The operator depends only on the ratios $`\varepsilon / h`$ and
-//! $`\tilde\tau / h^2`$ ([`Ratios`]), so one network serves every grid that has them. [`Networks`]
-//! chooses among the user's and the shipped ones.
-=======
-//! `K` is a convolution kernel of odd width `n_K`. `F: R -> R` is a perceptron `1-32-16-8-4-2-1` ([`Mlp`]). Both are trained so that
-//! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
-//! 2022). Rumpf, Sassen and Smoch use this form. Let `eps` be the width of the interface, `h` the spacing of the grid and `tautilde` the
-//! size of the step. The operator depends only on the ratios `eps / h` and `tautilde / h^2` ([`Ratios`]). So one network serves every grid
-//! with these ratios. [`Networks`] chooses among your networks and the shipped ones.
->>>>>>> 0a878c10 (Front pages of the crates in sentences of one thought)
+//! $`K`$ is a convolution kernel of odd width $`n_K`$. $`F: \mathbb{R} \to \mathbb{R}`$ is a perceptron `1-32-16-8-4-2-1` ([`Mlp`]). Both are
+//! trained so that shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
+//! 2022). Rumpf, Sassen and Norden-Smoch use this form. Let $`\varepsilon`$ be the width of the interface, $`h`$ the spacing of the grid and
+//! $`\tilde\tau`$ the size of the step. The operator depends only on the ratios $`\varepsilon / h`$ and $`\tilde\tau / h^2`$ ([`Ratios`]). So one
+//! network serves every grid with these ratios. [`Networks`] chooses among your networks and the shipped ones.
 //!
 //! # Training
 //!
