@@ -12,18 +12,15 @@ mod fuzzing;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use toml::{Table, Value};
 
-use crate::cli::Cli;
-use crate::error::one_line;
-use crate::prelude::*;
+use jobs::settings::COMMAND;
 
-/// The file of all options, resolved, in the folder of a run.
-pub const FILE: &str = "config.toml";
-/// The entry of a resolved configuration that names the subcommand.
-pub const COMMAND: &str = "command";
+use crate::cli::Cli;
+use crate::error::{Error, Result, one_line, refuse};
 
 /// Longest configuration file, in bytes; all options take some thousand.
 const LONGEST: usize = 1 << 16;
@@ -98,13 +95,6 @@ fn with_table(arguments: &[OsString], command: &str, table: &Table, path: &Path)
         .try_get_matches_from(all)
         .and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|error| bad(path, one_line(&error)))
-}
-
-/// All options of a run, to be read by [`parse_resolved`] and by `--config`.
-pub fn resolved(command: &str, options: &impl Serialize) -> Result<String> {
-    let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
-    let options = toml::to_string(options).map_err(unwritable)?;
-    Ok(format!("{COMMAND} = {command:?}\n{options}"))
 }
 
 fn bad(path: &Path, message: impl AsRef<str>) -> Error {

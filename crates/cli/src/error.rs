@@ -7,7 +7,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub enum Error {
-    /// Options that contradict each other or the input, and advice on what the crates below refuse.
+    /// Options that contradict each other, or that cannot be read.
     #[error("{0}")]
     Options(String),
     /// The help or the version, which was asked for.
@@ -15,19 +15,22 @@ pub enum Error {
     /// Ctrl-C ended the run, or the training, after what was said of it.
     #[error("interrupted")]
     Interrupted,
-    Engine(engine::Error),
+    /// From a job.
+    Jobs(#[from] jobs::Error),
+    /// From a stored run.
+    Engine(#[from] engine::Error),
+    /// From reading and writing files.
     Files(#[from] files::Error),
+    /// From grids and shapes.
     Geometry(#[from] geometry::Error),
-    Images(#[from] images::Error),
+    /// From networks.
     Model(#[from] model::Error),
+    /// From devices.
     Operators(#[from] operators::Error),
-    Pages(#[from] pages::Error),
-    Report(#[from] report::Error),
-    Render(#[from] render::Error),
+    /// From the folders of runs.
     Runs(#[from] runs::Error),
+    /// From time steps.
     Solver(#[from] solver::Error),
-    Surfaces(#[from] surfaces::Error),
-    Volumes(#[from] volumes::Error),
 }
 
 /// Returns [`Error::Options`] with a message that is given as to `format!`.
@@ -51,35 +54,9 @@ impl From<clap::Error> for Error {
     }
 }
 
-impl From<engine::Error> for Error {
-    fn from(error: engine::Error) -> Self {
-        match error {
-            // Time steps became too small.
-            engine::Error::TooStiff { .. } => Self::Options(format!(
-                "{}; the shape is not resolved, use more --cells",
-                files::with_causes(&error)
-            )),
-            error => Self::Engine(error),
-        }
-    }
-}
-
 impl Error {
-    pub fn options(message: impl Into<String>) -> Self {
+    pub(crate) fn options(message: impl Into<String>) -> Self {
         Self::Options(message.into())
-    }
-
-    /// Of a mesh that bounds nothing, and that can perhaps be repaired.
-    pub fn mesh(error: surfaces::Error) -> Self {
-        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open};
-        match error {
-            Open { .. }
-            | NonManifold { .. }
-            | MixedOrientation { .. }
-            | Nesting { .. }
-            | NoArea { .. } => Self::Options(format!("{error}, or give --repair")),
-            error => error.into(),
-        }
     }
 }
 

@@ -1,13 +1,16 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
-use std::io::{Read, Write};
+use std::io::Read;
+use std::path::PathBuf;
 
 use tempfile::TempDir;
 
-use crate::cli::{Command, InputOptions, MessageOptions};
-use crate::input::usual_format;
-use crate::prelude::*;
-use crate::values::Label;
+use jobs::InputOptions;
+use jobs::values::Label;
+
+use crate::cli::{Command, MessageOptions};
+use crate::console::Console;
+use crate::error::{Result, refuse};
 
 /// The files, in a folder of their own that nobody else can write to; it is removed in the end.
 #[derive(Default)]
@@ -18,8 +21,8 @@ pub struct Standard {
 
 impl Standard {
     /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
-    pub fn open(command: &mut Command, messages: &mut MessageOptions) -> Result<Self> {
-        let Some((input, save)) = paths(command) else {
+    pub fn open(command: &mut Command, messages: MessageOptions) -> Result<Self> {
+        let Some(Paths { input, save, once }) = paths(command) else {
             return Ok(Self::default());
         };
         let reads = input.input.as_deref() == Some("-");
@@ -52,8 +55,10 @@ impl Standard {
             if input.label == Some(Label::All) {
                 refuse!("--save - writes one mesh, and --label all makes several: give a file");
             }
-            messages.to_pipe = true;
-            let format = usual_format(input.input.as_deref().unwrap_or_default())?;
+            if let Some(once) = once {
+                *once = true;
+            }
+            let format = jobs::usual_format(input.input.as_deref().unwrap_or_default())?;
             *save = place("output", &format);
             output = Some(save.clone());
         }
@@ -63,27 +68,50 @@ impl Standard {
         })
     }
 
-    pub fn write(&self) -> Result<()> {
+    /// Whether standard output is a result.
+    pub fn is_piped(&self) -> bool {
+        self.output.is_some()
+    }
+
+    /// Writes the result to standard output, if it goes there.
+    pub fn write(&self, console: &Console) -> Result<()> {
         let Some(path) = &self.output else {
             return Ok(());
         };
         if !path.exists() {
             refuse!("nothing is written to standard output: the shape has vanished");
         }
-        let (bytes, mut out) = (files::read(path)?, std::io::stdout());
-        let written = out.write_all(&bytes).and_then(|()| out.flush());
-        Ok(written.map_err(files::Error::of("write", "standard output"))?)
+        console.write(&files::read(path)?)
     }
 }
 
 /// The input of a command and the file that it writes, if it has these.
-fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBuf>)> {
+struct Paths<'a> {
+    input: &'a mut InputOptions,
+    save: Option<&'a mut PathBuf>,
+    /// Where a run notes that the file is for this time alone.
+    once: Option<&'a mut bool>,
+}
+
+fn paths(command: &mut Command) -> Option<Paths<'_>> {
     match command {
-        Command::Check(check) => Some((&mut check.input, None)),
-        Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
+        Command::Check(check) => Some(Paths {
+            input: &mut check.options.input,
+            save: None,
+            once: None,
+        }),
+        Command::Sample(sample) => Some(Paths {
+            input: &mut sample.input,
+            save: Some(&mut sample.save),
+            once: None,
+        }),
         Command::Run(command) => {
             let options = command.options();
-            Some((&mut options.input, options.save.as_mut()))
+            Some(Paths {
+                input: &mut options.input,
+                save: options.save.as_mut(),
+                once: Some(&mut options.saves_once),
+            })
         }
         _ => None,
     }

@@ -5,7 +5,9 @@ use std::path::Path;
 use clap::CommandFactory;
 use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
 
-use super::{LONGEST, parse_both, parse_resolved, resolved};
+use jobs::settings::resolved;
+
+use super::{LONGEST, parse_both, parse_resolved};
 use crate::cli::{Cli, Command, RunCommand};
 use crate::error::Error;
 
@@ -32,7 +34,7 @@ fn text(cli: &Cli) -> Option<String> {
     let Command::Run(command) = &cli.command else {
         return None;
     };
-    resolved(command.name(), command).ok()
+    resolved(&command.clone().job()).ok()
 }
 
 fn utf8(bytes: &[u8]) -> Result<&str, Error> {
@@ -106,10 +108,10 @@ fn named_configurations() {
     configurations("named configurations")
         .valid([FLOW.as_bytes().to_vec()])
         .run(read, |_, cli| {
-            let Command::Run(RunCommand::Flow(options)) = &cli.command else {
+            let Command::Run(RunCommand::Flow(flow)) = &cli.command else {
                 panic!("{cli:?}");
             };
-            assert_eq!(options.run.input.input.as_deref(), Some("a.ply"));
+            assert_eq!(flow.options.run.input.input.as_deref(), Some("a.ply"));
         });
 }
 

@@ -39,7 +39,7 @@ fn sizes_are_kept_and_driven() {
     };
     run(
         "kept",
-        &["--volume", "keep", "--area", "keep", "--steps", "2"],
+        &["--area", "keep", "--length", "keep", "--steps", "2"],
     );
     for (name, multiplier) in [("area", "pressure"), ("length", "tension")] {
         let sizes = column(&at("kept"), name);
@@ -47,6 +47,7 @@ fn sizes_are_kept_and_driven() {
         let multipliers = column(&at("kept"), multiplier);
         assert!(multipliers.iter().all(|value| value.is_finite()));
     }
+    // In the plane the volume is another word for the area.
     run("smaller", &["--volume", "94%", "--steps", "4"]);
     let areas = column(&at("smaller"), "area");
     assert!(
@@ -79,7 +80,7 @@ fn edges_become_round_where_both_sizes_are_held() {
     let at = |name: &str| folder.path().join(name);
     write(&at("rectangle.npy"), &Cuboid::new([0.25, 0.15]).unwrap());
     let run = |name: &str, options: &[&str]| {
-        let both = ["--volume", "keep", "--area", "keep", "--ramp", "4"];
+        let both = ["--area", "keep", "--length", "keep", "--ramp", "4"];
         let options = [&both[..], options].concat();
         of_field(folder.path(), ["flow", "rectangle.npy", name], &options)
     };
@@ -101,14 +102,17 @@ fn edges_become_round_where_both_sizes_are_held() {
     assert!(last("stopped") == last("kept"));
 
     write(&at("thin.npy"), &Cuboid::new([0.25, 0.012]).unwrap());
-    let arguments = ["flow", "thin.npy", "--volume", "keep", "--area", "keep"];
+    let arguments = ["flow", "thin.npy", "--area", "keep", "--length", "keep"];
     let refused = program(folder.path()).args(arguments).output().unwrap();
     assert!(!refused.status.success());
     let message = text(&refused.stderr);
     assert!(
-        message.contains("area and volume cannot both be held"),
+        message.contains("length and area cannot both be held"),
         "{message}"
     );
+    // The area held the length in the plane once.
+    let holds = "--area holds the area of the inside; --length holds the length of the curve\n";
+    assert!(message.starts_with(holds), "{message}");
 }
 
 /// The speed of a disc is `1/(2 R^3) - c0^2/(2 R) - sigma/R - p`.

@@ -141,7 +141,7 @@ fn every_mistake_is_one_clear_line() {
                 "builtin:disc",
                 "--reduced-volume",
                 "0.8",
-                "--area",
+                "--length",
                 "keep",
             ],
             "cannot be used with",
@@ -151,8 +151,16 @@ fn every_mistake_is_one_clear_line() {
             "a volume of 100 does not fit a box of volume 4",
         ),
         (
-            &["flow", "builtin:disc", "--volume", "keep", "--area", "80%"],
+            &["flow", "builtin:disc", "--area", "keep", "--length", "80%"],
             "above 1; the perimeter has to be at least",
+        ),
+        (
+            &["flow", "builtin:disc", "--volume", "keep", "--area", "keep"],
+            "in the plane --volume is another word for --area",
+        ),
+        (
+            &["flow", "builtin:cube", "--length", "keep"],
+            "--length has no meaning for a surface in space",
         ),
         (
             &["flow", "builtin:disc", "--volume=-3%"],
@@ -224,8 +232,8 @@ fn every_mistake_is_one_clear_line() {
             "--inside has no meaning for a built-in shape",
         ),
         (
-            &["flow", "white.png", "--holds", "distance"],
-            "--holds has no meaning for an image",
+            &["flow", "white.png", "--field-kind", "distance"],
+            "--field-kind has no meaning for an image",
         ),
         (
             &["flow", "broken.npy", "--side-length", "1"],
@@ -357,7 +365,7 @@ fn every_mistake_is_one_clear_line() {
         ),
         (
             &["flow", "builtin:disc", "--up", "z"],
-            "--up z has no meaning in the plane",
+            "--up z has no meaning for a shape in the plane",
         ),
         (
             &["flow", "builtin:cube", "--up", "w"],
@@ -409,7 +417,7 @@ fn every_mistake_is_one_clear_line() {
                 "--without",
                 "ball:0,0,1",
             ],
-            "what --without leaves has 0 of",
+            "the shape that --without leaves has 0 of",
         ),
         (
             &["sample", "box:0,0,1", "--save", "a.png"],

@@ -87,7 +87,7 @@ pub use mesh::TriangleMesh;
 pub use read::error::FormatError;
 pub use read::{decode, read, rewrite, vertex_colours};
 pub use remeshing::remeshed_surface;
-pub use repair::{Repaired, repair};
+pub use repair::{RepairChanges, Repaired, repair};
 pub use signs::mend_signs;
 pub use smoothing::TAUBIN;
 pub use write::{encode, write};

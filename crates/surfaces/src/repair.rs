@@ -21,15 +21,22 @@ const LEAF: usize = 8;
 const FAR: f64 = 2.0;
 
 /// A closed mesh, and how it differs from what it was made of.
-#[derive(Clone, Debug, Display)]
+#[derive(Clone, Debug)]
+pub struct Repaired {
+    /// The mesh.
+    pub mesh: ClosedMesh,
+    /// The differences.
+    pub changes: RepairChanges,
+}
+
+/// How a repaired mesh differs from what it was made of.
+#[derive(Clone, Copy, Debug, PartialEq, Display)]
 #[display(
     "repaired with cells of {spacing:.3e}: {turned} faces were turned round, {:.2} % of the new surface closes holes, {:.2} % of the old \
      one was inside or too thin and is left out",
     100.0 * added, 100.0 * dropped
 )]
-pub struct Repaired {
-    /// The mesh.
-    pub mesh: ClosedMesh,
+pub struct RepairChanges {
     /// The side of the cells on which it was made: smaller details are lost.
     pub spacing: f64,
     /// Faces that were turned round to agree with their neighbours.
@@ -89,13 +96,13 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
         far / f64::max(all, f64::MIN_POSITIVE)
     };
     let to_new = MeshDistance::new(&new);
-    Ok(Repaired {
+    let changes = RepairChanges {
         spacing: grid.spacing(),
         turned,
         added: far_part(new.mesh(), &to_old),
         dropped: far_part(&old, &|x| to_new.signed_distance(x.to_array()).abs()),
-        mesh: new,
-    })
+    };
+    Ok(Repaired { mesh: new, changes })
 }
 
 fn sampled(grid: Grid<3>, value: impl Fn(Vector) -> f64 + Sync) -> Result<Field<3>, Error> {

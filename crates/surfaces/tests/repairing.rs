@@ -44,17 +44,18 @@ fn holes_are_closed_and_all_else_stays() {
     assert!(low > 0.36 && high < 0.41, "{low} {high}");
     // A cap of this size has 2 % of the area.
     assert!(
-        repaired.added < 0.03 && repaired.dropped < 0.01,
-        "{repaired}"
+        repaired.changes.added < 0.03 && repaired.changes.dropped < 0.01,
+        "{}",
+        repaired.changes
     );
-    assert_eq!(repaired.turned, 0);
+    assert_eq!(repaired.changes.turned, 0);
 }
 
 #[test]
 fn vertices_of_no_face_do_not_make_the_cells_larger() {
     let mut mesh = sphere();
     mesh.normals = None;
-    let spacing = |mesh: &TriangleMesh| repair(mesh, 32).unwrap().spacing.to_bits();
+    let spacing = |mesh: &TriangleMesh| repair(mesh, 32).unwrap().changes.spacing.to_bits();
     let expected = spacing(&mesh);
     mesh.vertices.push([1000.0, 0.0, 0.0]);
     assert_eq!(spacing(&mesh), expected);
@@ -69,7 +70,7 @@ fn faces_of_mixed_orientation_agree() {
     }
     assert!(ClosedMesh::new(mixed.clone()).is_err());
     let repaired = repair(&mixed, 48).unwrap();
-    assert!((repaired.turned as f64 / mixed.faces.len() as f64 - 1.0 / 3.0).abs() < 0.01);
+    assert!((repaired.changes.turned as f64 / mixed.faces.len() as f64 - 1.0 / 3.0).abs() < 0.01);
     let (low, high) = radii(&repaired.mesh);
     assert!(low > 0.39 && high < 0.41, "{low} {high}");
     // Inside out as a whole, too.
@@ -89,7 +90,7 @@ fn what_crosses_itself_becomes_one() {
         (found / expected - 1.0).abs() < 0.02,
         "{found}, not {expected}"
     );
-    assert!(repaired.dropped > 0.2, "{repaired}");
+    assert!(repaired.changes.dropped > 0.2, "{}", repaired.changes);
 }
 
 /// Two levers that cross each other, some of their sides at small angles, others less than a cell apart.
@@ -102,7 +103,7 @@ fn creases_have_neither_slivers_nor_short_edges() {
         let repaired = repair(&two, cells).unwrap();
         let mesh = repaired.mesh.mesh();
         let smallest = smallest_angles(mesh)[0];
-        let shortest = shortest_edge(mesh) / repaired.spacing;
+        let shortest = shortest_edge(mesh) / repaired.changes.spacing;
         println!("{cells} cells: {smallest:.1} degrees, edges from {shortest:.2} cells");
         assert!(smallest > 25.0, "{smallest} degrees");
         assert!(shortest > 0.3, "{shortest} cells");
@@ -119,8 +120,9 @@ fn a_closed_mesh_stays_as_it_is() {
     );
     assert!((repaired.mesh.volume() / lever.volume() - 1.0).abs() < 0.01);
     assert!(
-        repaired.added < 1e-3 && repaired.dropped < 1e-3,
-        "{repaired}"
+        repaired.changes.added < 1e-3 && repaired.changes.dropped < 1e-3,
+        "{}",
+        repaired.changes
     );
     assert!(repair(&TriangleMesh::default(), 32).is_err());
     let sheet = TriangleMesh {

@@ -1,15 +1,20 @@
 //! What the program says of itself: `willmore info`, `networks`, `completions` and `man`.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use clap::CommandFactory;
 use clap_complete::Shell;
 use model::{Network, Shipped};
 
-use crate::cli::{Cli, MessageOptions, NetworksCommand, write_out};
-use crate::prelude::*;
+use operators::{ComputeDevice, DeviceKind};
+use serde_json::{Value, json};
 
-pub fn info(messages: MessageOptions) -> Result<()> {
+use crate::cli::{Cli, NetworksCommand};
+use crate::console::Console;
+use crate::error::{Result, refuse};
+
+pub fn info(console: &Console) -> Result<()> {
     let version = env!("CARGO_PKG_VERSION");
     let mut devices = Vec::new();
     let mut text = format!(
@@ -36,10 +41,10 @@ pub fn info(messages: MessageOptions) -> Result<()> {
         "devices": devices,
         "networks": { "accurate": accurate, "paper": paper },
     });
-    messages.report(&outcome, &text)
+    console.report(&outcome, &text)
 }
 
-pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Result<()> {
+pub fn networks(show: Option<&NetworksCommand>, console: &Console) -> Result<()> {
     let all = [Shipped::Accurate.all()?, Shipped::Paper.all()?].concat();
     let mut all = all.iter().map(|(name, network)| (stem(name), network));
     let Some(NetworksCommand::Show { network: wanted }) = show else {
@@ -49,7 +54,7 @@ pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Res
                 (line, about(&name, network))
             })
             .unzip();
-        return messages.report(&Value::Array(list), &lines.join("\n"));
+        return console.report(&Value::Array(list), &lines.join("\n"));
     };
     let path = Path::new(wanted);
     let network = match all.find(|(name, _)| *name == stem(wanted)) {
@@ -63,7 +68,7 @@ pub fn networks(show: Option<&NetworksCommand>, messages: MessageOptions) -> Res
         }
     };
     let about = about(&stem(wanted), network);
-    messages.report(&about, &format!("{about:#}"))
+    console.report(&about, &format!("{about:#}"))
 }
 
 fn about(name: &str, network: &Network) -> Value {
@@ -80,14 +85,14 @@ fn stem(name: &str) -> String {
     name.trim_end_matches(".safetensors").to_owned()
 }
 
-pub fn completions(shell: Shell) -> Result<()> {
+pub fn completions(shell: Shell, console: &Console) -> Result<()> {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
-    write_out(&text)
+    console.write(&text)
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
-pub fn man() -> Result<()> {
+pub fn man(console: &Console) -> Result<()> {
     let mut text = Vec::new();
     let mut command = Cli::command();
     command.build();
@@ -97,5 +102,5 @@ pub fn man() -> Result<()> {
             .render(&mut text)
             .map_err(files::Error::of("make the manual page of", page.get_name()))?;
     }
-    write_out(&text)
+    console.write(&text)
 }

@@ -3,13 +3,19 @@ use std::sync::Arc;
 use chacha20::ChaCha8Rng;
 use linearize::taylor::{halvings, remainder};
 use model::{MeanCurvatureOperator, Network};
-use operators::{add_scaled, inner_product};
+use operators::{ComputeDevice, DeviceKind, add_scaled, inner_product};
 use rand::{RngExt, SeedableRng};
 use solver::{FlowParams, MinimizingMovement, Objective};
 
-use crate::cli::{CheckOptions, MessageOptions};
-use crate::input::{Loaded, Reader};
-use crate::prelude::*;
+use engine::Method;
+use geometry::Field;
+use jobs::Opened;
+use serde::Serialize;
+use serde_json::json;
+
+use crate::cli::CheckOptions;
+use crate::console::Console;
+use crate::error::{Result, refuse};
 
 /// Steps of the Taylor expansion, the first one and how often it is halved.
 const FIRST_STEP: f64 = 0.25;
@@ -29,13 +35,13 @@ struct Finding {
 }
 
 /// Checks the derivatives of the energy at the input.
-pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
+pub fn run(mut options: CheckOptions, console: &Console) -> Result<()> {
     options.operator.fill_in()?;
     let device = options.common.open_device()?;
     let eps_over_h = options.operator.eps_over_h();
-    let findings = match Reader::of(&mut options.input, eps_over_h, messages)?.load()? {
-        Loaded::Plane(start) => findings(&start.initial.field()?, &options, &device)?,
-        Loaded::Space(start) => findings(&start.initial.field()?, &options, &device)?,
+    let findings = match jobs::open(&mut options.input, eps_over_h, console)? {
+        Opened::Plane(start) => findings(&start.field()?, &options, &device)?,
+        Opened::Space(start) => findings(&start.field()?, &options, &device)?,
     };
     let line = |finding: &Finding| {
         let verdict = if finding.passed { "ok" } else { "WRONG" };
@@ -44,7 +50,7 @@ pub fn run(mut options: CheckOptions, messages: MessageOptions) -> Result<()> {
     let text: Vec<String> = findings.iter().map(line).collect();
     let outcome =
         json!({ "command": "check", "device": options.common.device, "checks": findings });
-    messages.report(&outcome, &text.join("\n"))?;
+    console.report(&outcome, &text.join("\n"))?;
     let failed = findings.iter().filter(|finding| !finding.passed);
     let failed: Vec<&str> = failed.map(|finding| finding.name).collect();
     if !failed.is_empty() {

@@ -1,32 +1,40 @@
-use super::flow;
-use crate::cli::{Command, MessageOptions, ResumeOptions};
-use crate::prelude::*;
-use crate::{config, page};
+use engine::Stop;
+use jobs::settings;
+use runs::RunDirectory;
+use serde_json::json;
+
+use super::run::tell;
+use crate::cli::{Command, ResumeOptions};
+use crate::config;
+use crate::console::Console;
+use crate::error::{Result, refuse};
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
-pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
+pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
     let stored = if options.recover {
         RunDirectory::recover(&options.run)?
     } else {
         RunDirectory::open(&options.run)?
     };
-    let path = options.run.join(config::FILE);
-    let parsed = config::parse_resolved(&stored.read_text(config::FILE)?, &path)?;
-    let Command::Run(mut command) = parsed.command else {
+    let path = options.run.join(settings::FILE);
+    let parsed = config::parse_resolved(&stored.read_text(settings::FILE)?, &path)?;
+    let Command::Run(command) = parsed.command else {
         let path = path.display();
         refuse!("{path} names no command that makes runs");
     };
-    let stored_options = command.options();
+    let mut job = command.job();
+    let stored_options = job.options();
     // A run that was over may have written the file of --save itself.
     let was_over = stored.is_finished() || engine::notes(&stored)["was_over"] == true;
     stored_options.force.force = options.force.force || was_over;
     if !stored.is_finished() || options.steps.is_some() {
-        return flow::run(command, messages, Some((stored, options.steps)));
+        let outcome = jobs::resume(job, stored, options.steps, console)?;
+        return tell(&outcome, console);
     }
     // Nothing else is touched in a finished run: what is there besides may be its owner's.
     stored.tidy()?;
     if !stored_options.no_page {
-        page::write(&stored)?;
+        jobs::write_page(&stored)?;
     }
     let folder = options.run.to_string_lossy();
     let command = &engine::notes(&stored)["about"]["command"];
@@ -38,5 +46,5 @@ pub fn run(options: &ResumeOptions, messages: MessageOptions) -> Result<()> {
         stop => stop.map_or(String::new(), |stop| format!(": {stop}")),
     };
     let text = format!("The run in {folder} is finished already{advice}");
-    messages.report(&outcome, &text)
+    console.report(&outcome, &text)
 }

@@ -1,134 +1,23 @@
-use volumes::Volume;
+use jobs::SampleOptions;
+use serde_json::json;
 
-use crate::cli::{MessageOptions, SampleOptions};
-use crate::input::{InitialShape, Loaded, Reader, Source, check_phases, closed};
-use crate::paths::{MESHES, extension};
-use crate::prelude::*;
-use crate::presentation::Presentation;
-use crate::values::Label;
-use crate::volume;
-
-/// Interface width in cells of what is written.
-const EPS_OVER_H: f64 = 2.0;
+use super::labels;
+use crate::console::Console;
+use crate::error::Result;
 
 /// Writes an input as the flows begin with it, possibly damaged.
-pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
-    let path = options.save.clone();
+pub fn run(options: SampleOptions, console: &Console) -> Result<()> {
     let of_label = |label| {
         let mut one = options.clone();
-        one.input.label = Some(Label::One(label));
-        one.save = volume::named(&path, label);
-        run(one, messages)
+        labels::choose(&mut one.input, label);
+        labels::named(&mut one.save, label);
+        run(one, console)
     };
-    if volume::with_each_label(&options.input, messages, of_label)? {
+    if labels::with_each(&options.input, console, of_label)? {
         return Ok(());
     }
-    let format = extension(&path);
-    let is_mesh = MESHES.contains(&&*format);
-    let shown = path.display();
-    if !is_mesh && !["png", "svg", "npy", "vti", "nii", "gz"].contains(&&*format) {
-        refuse!(
-            "--save {shown} must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
-        );
-    }
-    options.force.check(&path)?;
-    let noise = options.noise;
-    if !(noise.is_finite() && noise >= 0.0) {
-        refuse!("--noise {noise} must not be negative");
-    }
-    if noise > 0.0 && !is_mesh {
-        refuse!(
-            "--noise moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
-        );
-    }
-    let input = &options.input;
-    let as_it_is = is_mesh
-        && !options.resample
-        && options.without.is_empty()
-        && input.cells.is_none()
-        && input.box_side.is_none()
-        && input.side_length.is_none();
-    let repairs = input.repair;
-    let mut reader = Reader::of(&mut options.input, EPS_OVER_H, messages)?;
-    if let (Source::Mesh(from), true) = (&reader.source, as_it_is) {
-        let mut mesh = if repairs {
-            closed(from, true, messages)?.into_mesh()
-        } else {
-            surfaces::read(from)?
-        };
-        if noise > 0.0 {
-            // Those in the file may not be outward.
-            mesh.normals = None;
-            mesh.roughen(noise, options.seed);
-        }
-        surfaces::write(&path, &mesh)?;
-    } else {
-        match reader.load()? {
-            Loaded::Plane(start) => write(start, options, &path)?,
-            Loaded::Space(start) if noise > 0.0 => {
-                let u = without(start.initial.field()?, &options.without)?;
-                let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
-                mesh.roughen(noise, options.seed);
-                surfaces::write(&path, &mesh)?;
-            }
-            Loaded::Space(start) => write(start, options, &path)?,
-        }
-    }
+    let path = options.save.clone();
+    jobs::sample(options, console)?;
     let outcome = json!({ "command": "sample", "file": path.to_string_lossy() });
-    messages.report(&outcome, &format!("wrote {shown}"))
-}
-
-fn eps<const D: usize>(u: &Field<D>) -> f64 {
-    EPS_OVER_H * u.grid().spacing()
-}
-
-fn write<const D: usize, O: Presentation<D>>(
-    mut start: InitialShape<D, O>,
-    mut options: SampleOptions,
-    path: &Path,
-) -> Result<()> {
-    start.presentation.turn(&mut options.up)?;
-    let u = without(start.initial.field()?, &options.without)?;
-    let eps = eps(&u);
-    match &*extension(path) {
-        "npy" => npy::write(path, &u)?,
-        "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
-        "vti" => vti::write(path, "phase_field", &u)?,
-        "png" => {
-            let u = u.into();
-            let picture = start.presentation.picture(&u, &u, eps)?;
-            picture.write_png(path)?;
-        }
-        _ => {
-            O::check_saved(path)?;
-            start.presentation.save(&u.into(), eps, path)?;
-        }
-    }
-    Ok(())
-}
-
-/// The nodes inside as voxels labelled 1.
-fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume> {
-    let grid = u.grid();
-    let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
-        refuse!("--save {}: a shape in {D}D has no voxels", path.display());
-    };
-    let cells = grid.cells();
-    // The first axis runs fastest.
-    let label = |voxel: usize| {
-        let digits = std::array::from_fn(|axis| voxel / cells.pow(axis as u32) % cells);
-        u8::from(u.values()[grid.index(digits)] > 0.0)
-    };
-    let labels = (0..grid.len()).map(label).collect();
-    let sides = [grid.spacing(); 3];
-    Ok(Volume::of_labels([cells; 3], origin, sides, labels)?)
-}
-
-fn without<const D: usize>(mut u: Field<D>, regions: &[Region]) -> Result<Field<D>> {
-    for region in regions {
-        let hole = phase_field(*u.grid(), region.shape::<D>()?.as_ref(), eps(&u))?;
-        u = u.zip_map(&hole, |u, hole| u.min(-hole))?;
-    }
-    check_phases(&u, "what --without leaves")?;
-    Ok(u)
+    console.report(&outcome, &format!("wrote {}", path.display()))
 }

@@ -3,16 +3,20 @@ use model::Ratios;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, SphereData, Training, TrainingProgress};
 
-use crate::case::check_eps_over_h;
-use crate::cli::{MessageOptions, TrainOptions};
-use crate::prelude::*;
+use jobs::check_eps_over_h;
+use runs::Interrupt;
+use serde_json::json;
+
+use crate::cli::TrainOptions;
+use crate::console::Console;
+use crate::error::{Error, Result};
 
 /// Cells per unit length of the training grid for `eps = 2h`; it grows with the interface, so that the same spheres fit.
 const CELLS: f64 = 128.0;
 /// Radii on which the quality is measured.
 const HELD_OUT: usize = 20;
 
-pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
+pub fn run(mut options: TrainOptions, console: &Console) -> Result<()> {
     let missing = |name: &str| {
         Error::options(format!(
             "train needs --{name}; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
@@ -42,7 +46,7 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
         held_out: if options.quick { 2 } else { HELD_OUT },
     };
     let interrupt = Interrupt::catch()?;
-    let progress = messages.progress();
+    let progress = console.progress();
     let bar = progress.bar("training", 1);
     let mut observer = |at: &TrainingProgress, _: &Checkpoint<()>| {
         bar.set_length(at.of as u64);
@@ -53,7 +57,7 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     bar.finish();
     progress.clear();
     if let Err(model::Error::Interrupted { .. }) = &trained {
-        messages.warn("interrupted: nothing of the training is kept");
+        console.warn("interrupted: nothing of the training is kept");
     }
     let trained = trained?;
     let loss = trained.quality.held_out_loss;
@@ -68,5 +72,5 @@ pub fn run(mut options: TrainOptions, messages: MessageOptions) -> Result<()> {
     });
     let shown = save.display();
     let text = format!("{ratios}: held-out loss {loss:.2e}; written to {shown}");
-    messages.report(&outcome, &text)
+    console.report(&outcome, &text)
 }

@@ -1,5 +1,6 @@
 //! A run from its start, or from where it was stopped, to its end.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::time::Instant;
@@ -9,24 +10,25 @@ use files::FileSystem as _;
 use geometry::measure::touches_side;
 use solver::StepEstimates;
 
-use crate::cli::{InputOptions, MessageOptions, RunOptions};
-use crate::faired::Faired;
-use crate::outcome::{self, SIZES};
+use crate::events::Progress;
+use crate::faired::{Faired, MeshReport};
+use crate::options::{InputOptions, RunOptions};
+use crate::outcome::{GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
 use crate::page;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
 
 /// Everything about a run but its case.
-pub struct Plan<const D: usize, O> {
+pub struct Plan<'a, const D: usize, O> {
     pub command: &'static str,
     pub presentation: O,
     pub options: RunOptions,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
-    pub messages: MessageOptions,
+    pub watcher: &'a dyn Watcher,
 }
 
-impl<const D: usize, O: Presentation<D>> Plan<D, O> {
+impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
     /// What is kept with the run.
     pub fn notes(&self, case: &Case<D>, device: &ComputeDevice) -> Value {
         let network = case.operator.network();
@@ -54,48 +56,51 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
     }
 
     /// From the last checkpoint to the end.
-    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<()> {
-        let interrupt = Interrupt::catch()?;
-        let (nodes, stored) = (run.case().grid().len(), run.stored_cells());
-        let what = if stored < nodes {
-            let percent = 100.0 * stored as f64 / nodes as f64;
-            format!("bricks near the surface, {percent:.0} % of the grid")
-        } else {
-            "the whole grid".to_owned()
-        };
-        let gigabytes = 1e-9 * run.case().bytes(stored);
-        self.messages.note(&format!(
-            "storage: {what}, about {gigabytes:.1} GB of memory (--storage)"
-        ));
+    pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<Outcome> {
+        let interrupt = self.watcher.interrupt()?;
+        let stored = run.stored_cells();
+        self.watcher.note(&Note::Storage {
+            part: stored as f64 / run.case().grid().len() as f64,
+            bytes: run.case().bytes(stored),
+        });
         let folder = store.directory().path().to_owned();
-        let progress = self.messages.progress();
         let title = format!("{} of {}", self.command, run.case().shape);
-        let mut bar = progress.bar(title, self.options.steps.unwrap_or(0) as u64);
+        let progress = self
+            .watcher
+            .begins(&title, self.options.steps.unwrap_or(0) as u64);
         let clock = Instant::now();
+        let mut steps = Steps(&*progress);
         let mut pictures = Pictures {
             plan: self,
             topology: None,
         };
-        let observers: &mut [&mut dyn Observer<D>] = &mut [&mut bar, &mut pictures];
+        let observers: &mut [&mut dyn Observer<D>] = &mut [&mut steps, &mut pictures];
         let ended = run.advance(Some(&mut store), observers, &interrupt)?;
         let seconds = clock.elapsed().as_secs_f64();
-        let outcome = if ended.is_some() {
-            self.finish(store, &run)?
+        let mut summary = None;
+        if ended.is_some() {
+            summary = Some(self.finish(store, &run)?);
         } else {
             drop(store);
-            let (steps, time) = (run.steps(), run.time());
-            json!({ "command": self.command, "finished": false, "steps": steps, "time": time })
-        };
-        if !self.options.no_page {
+        }
+        let page = (!self.options.no_page).then(|| folder.join(presentation::PAGE));
+        if page.is_some() {
             page::write(&RunDirectory::open(&folder)?)?;
         }
-        bar.finish();
-        progress.clear();
-        self.tell(&run, outcome, &folder, seconds)?;
-        ended.map(|_| ()).ok_or(Error::Interrupted)
+        Ok(Outcome {
+            command: self.command,
+            folder,
+            steps: run.steps(),
+            time: run.time(),
+            ended: run.ended(),
+            summary,
+            page,
+            save: self.options.save.clone(),
+            seconds,
+        })
     }
 
-    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Value> {
+    fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Summary> {
         let (case, u, presentation) = (run.case(), run.stored(), &self.presentation);
         let (start, eps) = (&case.initial, case.scales.eps);
         let directory = store.directory();
@@ -118,75 +123,63 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
         } else if self.options.save.is_some() {
-            let gone = "nothing is saved to the file of --save: the shape has vanished";
-            self.messages.warn(gone);
+            self.watcher.warning(&Warning::NothingSaved);
         }
         if self.options.frames.is_some() {
-            let (pictures, series) = frames(directory.path(), run.records());
-            // There are none of a shape that is never there.
-            if !pictures.is_empty() {
-                let frame = |index: usize| -> Result<Picture> {
-                    let picture = &pictures[index];
-                    Ok(images::colours(picture, &files::read(picture)?)?)
-                };
-                let animation = render::animation(pictures.len(), frame)?;
-                directory.write_file(presentation::ANIMATION, &animation)?;
-                directory.write_file(presentation::SERIES, series.as_bytes())?;
-            }
+            write_film(run, directory)?;
         }
+        let summary = self.summary(run, topology, faired.map(|faired| faired.report));
+        let text = format!("{:#}\n", summary.to_json());
+        directory.write_file(presentation::SUMMARY, text.as_bytes())?;
+        store.finish(run)?;
+        Ok(summary)
+    }
+
+    fn summary(&self, run: &Run<D>, topology: Topology, mesh: Option<MeshReport>) -> Summary {
+        let (case, u) = (run.case(), run.stored());
+        let eps = case.scales.eps;
         // Touching sheets have no topology; that is no reason not to flow.
-        let of_start = || presentation.topology(start, eps).unwrap_or_default();
-        let before = presentation.input().unwrap_or_else(of_start);
+        let of_start = || {
+            let of_start = self.presentation.topology(&case.initial, eps);
+            of_start.unwrap_or_default()
+        };
+        let before = self.presentation.input().unwrap_or_else(of_start);
         let (first, last) = (run.records().first(), run.records().last());
         let energy = last.and_then(Record::willmore_energy);
+        let first_energy = first.and_then(Record::energy_at_rest);
         let is_willmore = case.energy.is_willmore();
         let spheres = energy.filter(|_| D == 3 && is_willmore);
-        let first_energy = first.and_then(Record::energy_at_rest);
         let target = case.stops.iter().find_map(|stop| match stop {
             Stop::Energy(target) => Some(*target),
             Stop::EnergyRatio(part) => Some(part * first_energy?),
             _ => None,
         });
-        let mut outcome = json!({
-            "command": self.command,
-            "finished": true,
-            "steps": run.steps(),
-            "time": run.time(),
-            "time_steps": time_accuracy(run.records(), eps).filter(|_| has_interface(u)),
-            "shortened_steps": run.records().iter().filter(|record| is_shortened(record)).count(),
-            "first_energy": first_energy,
-            "energy": energy,
-            "energy_terms": energy.filter(|_| !is_willmore).map(|_| case.energy),
-            "energy_over_8_pi": spheres.map(|energy| energy / (8.0 * PI)),
-            "energy_reached": target.map(|target| energy.is_some_and(|energy| energy <= target)),
-            "components": topology.components,
-            "euler_characteristic": topology.euler_characteristic,
-            "same_topology": topology == before,
-            "touches_box": touches_side(u, -0.5),
-            "mesh": faired.map(|faired| faired.report),
-            "grid": {
-                "cells": case.grid().cells(),
-                "spacing": case.grid().spacing(),
-                "origin": case.grid().origin().to_vec(),
-                "interface_width": eps,
-                "stored_cells": run.stored_cells(),
+        Summary {
+            command: self.command.to_owned(),
+            finished: true,
+            steps: run.steps(),
+            time: run.time(),
+            time_steps: time_accuracy(run.records(), eps).filter(|_| has_interface(u)),
+            shortened_steps: run.records().iter().filter(|r| is_shortened(r)).count(),
+            first_energy,
+            energy,
+            energy_terms: energy.filter(|_| !is_willmore).map(|_| case.energy),
+            energy_over_8_pi: spheres.map(|energy| energy / (8.0 * PI)),
+            energy_reached: target.map(|target| energy.is_some_and(|energy| energy <= target)),
+            components: topology.components,
+            euler_characteristic: topology.euler_characteristic,
+            same_topology: topology == before,
+            touches_box: touches_side(u, -0.5),
+            mesh,
+            grid: GridSummary {
+                cells: case.grid().cells(),
+                spacing: case.grid().spacing(),
+                origin: case.grid().origin().to_vec(),
+                interface_width: eps,
+                stored_cells: run.stored_cells(),
             },
-        });
-        if let Some(entries) = outcome.as_object_mut() {
-            entries.retain(|_, value| !value.is_null());
+            measures: measures(run),
         }
-        for (name, value) in last.map_or(run.start(), |record| &record.measures) {
-            outcome[name] = (*value).into();
-            let before = run.start().get(name).filter(|_| SIZES.contains(&&**name));
-            if let Some(before) = before.filter(|before| **before > 0.0) {
-                let change = 100.0 * (value / before - 1.0);
-                outcome[&format!("{name}_change_percent")] = change.into();
-            }
-        }
-        let text = format!("{outcome:#}\n");
-        directory.write_file(presentation::SUMMARY, text.as_bytes())?;
-        store.finish(run)?;
-        Ok(outcome)
     }
 
     /// Writes the field for ParaView and, unless the shape has vanished, a picture and the shape to files `stem.*` of a run.
@@ -236,39 +229,54 @@ impl<const D: usize, O: Presentation<D>> Plan<D, O> {
             None => self.presentation.save(u, eps, path),
         }
     }
+}
 
-    fn tell(&self, run: &Run<D>, mut outcome: Value, folder: &Path, seconds: f64) -> Result<()> {
-        let (progress, ended) = (outcome::progress(run.steps(), run.time()), run.ended());
-        let reason = match &ended {
-            None | Some(Stop::Steps(_)) => String::new(),
-            Some(stop) => format!(": {stop}"),
-        };
-        let mut text = vec![format!("{progress} in {seconds:.1} s{reason}")];
-        text.extend(outcome::sentences(&outcome));
-        let shown = folder.display();
-        text.push(if outcome["finished"] == false {
-            // What was there already is to be written over by whoever goes on, too.
-            let saved = self.options.save.as_deref().is_some_and(Path::exists);
-            let force = if saved { " --force" } else { "" };
-            format!("interrupted, go on with: willmore resume {shown}{force}")
-        } else if self.options.no_page {
-            format!("results are in {shown}")
-        } else {
-            let page = folder.join(presentation::PAGE);
-            format!("results are in {shown}, to look at: {}", page.display())
-        });
-        if let Some(stop) = &ended {
-            outcome["ended"] = stop.to_string().into();
+/// The measures at the end, and by how much in percent sizes have changed.
+fn measures<const D: usize>(run: &Run<D>) -> BTreeMap<String, Option<f64>> {
+    let last = run.records().last();
+    let mut all = BTreeMap::new();
+    for (name, value) in last.map_or(run.start(), |record| &record.measures) {
+        all.insert(name.clone(), Some(*value).filter(|value| value.is_finite()));
+        let before = run.start().get(name).filter(|_| SIZES.contains(&&**name));
+        if let Some(before) = before.filter(|before| **before > 0.0) {
+            let change = 100.0 * (value / before - 1.0);
+            all.insert(format!("{name}_change_percent"), Some(change));
         }
-        outcome["run"] = folder.to_string_lossy().into();
-        outcome["seconds"] = seconds.into();
-        self.messages.report(&outcome, &text.join("\n"))
+    }
+    all
+}
+
+/// Writes the animation of the frames and their list for `ParaView`. There are none of a shape that is never there.
+fn write_film<const D: usize>(run: &Run<D>, directory: &mut RunDirectory) -> Result<()> {
+    let (pictures, series) = frames(directory.path(), run.records());
+    if pictures.is_empty() {
+        return Ok(());
+    }
+    let frame = |index: usize| -> Result<Picture> {
+        let picture = &pictures[index];
+        Ok(images::colours(picture, &files::read(picture)?)?)
+    };
+    let animation = render::animation(pictures.len(), frame)?;
+    directory.write_file(presentation::ANIMATION, &animation)?;
+    directory.write_file(presentation::SERIES, series.as_bytes())?;
+    Ok(())
+}
+
+/// Tells how many steps are complete.
+struct Steps<'a>(&'a dyn Progress);
+
+impl<const D: usize> Observer<D> for Steps<'_> {
+    fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
+        if let Some(step) = event.step() {
+            self.0.reach(step as u64);
+        }
+        Ok(())
     }
 }
 
 /// Writes the shape at the beginning, and pictures of it in between, and says when its parts or holes change.
 struct Pictures<'a, const D: usize, O> {
-    plan: &'a Plan<D, O>,
+    plan: &'a Plan<'a, D, O>,
     topology: Option<Topology>,
 }
 
@@ -298,9 +306,12 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
         let topology = plan.presentation.topology(u, eps).ok();
         if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
             let time = event.run.time();
-            plan.messages.note(&format!(
-                "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
-            ));
+            plan.watcher.note(&Note::TopologyChanged {
+                step,
+                time,
+                before,
+                now,
+            });
         }
         self.topology = topology.or(self.topology);
         Ok(())
@@ -321,16 +332,11 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
     if let (Some(input), Some(folder)) = (input.input.as_deref(), whole(folder))
         && whole(Path::new(input)).is_some_and(|input| input.starts_with(folder))
     {
-        refuse!(
-            "{input} is in the folder of --output, which --force would remove: copy it elsewhere, or give another --output"
-        );
+        return Err(Error::InputInTheRun(input.to_owned()));
     }
     stored.tidy()?;
     if let Some(other) = foreign(&stored) {
-        refuse!(
-            "{} is not of the run in this folder, which --force would remove: move it away, or give another --output",
-            other.display()
-        );
+        return Err(Error::NotOfTheRun(other));
     }
     // The folder itself stays: it may be the one that the program works in, a link, or a disk.
     let empty = || -> std::io::Result<()> {
@@ -377,15 +383,15 @@ fn estimates(record: &Record) -> Option<StepEstimates> {
 
 /// What controlled steps say of themselves: their [estimated error](estimated_time_error), the way of the place that moves farthest in each,
 /// and the longest displacement of a stage in interface widths.
-fn time_accuracy(records: &[Record], eps: f64) -> Option<Value> {
+fn time_accuracy(records: &[Record], eps: f64) -> Option<TimeAccuracy> {
     let estimates = records.iter().filter_map(estimates);
     let longest = estimates.clone().map(|e| e.displacement);
     let longest = longest.reduce(f64::max)?;
-    Some(json!({
-        "estimated_error": estimated_time_error(records),
-        "path": estimates.map(|e| e.motion).sum::<f64>(),
-        "longest_displacement_in_widths": longest / eps,
-    }))
+    Some(TimeAccuracy {
+        estimated_error: estimated_time_error(records),
+        path: estimates.map(|e| e.motion).sum::<f64>(),
+        longest_displacement_in_widths: longest / eps,
+    })
 }
 
 /// The files of the pictures of the frames in the folder of a run, and their fields with their times, for `ParaView`.

@@ -6,8 +6,9 @@ use engine::{
 use model::{Network, Networks};
 use solver::NewtonParams;
 
-use crate::cli::{CommonOptions, FlowOptions, MessageOptions, OperatorOptions, RunCommand};
+use crate::command::Command;
 use crate::input::{InitialShape, usual_box};
+use crate::options::{CommonOptions, FlowOptions, OperatorOptions};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -23,17 +24,22 @@ const INPAINT_HALVINGS: u32 = 12;
 const RAMP: usize = 20;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
+///
+/// # Errors
+/// [`Error::InterfaceWidth`]
 pub fn check_eps_over_h(eps_over_h: f64) -> Result<()> {
-    if !(0.5..=64.0).contains(&eps_over_h) {
-        refuse!(
-            "--eps-over-h {eps_over_h} is not possible: an interface is from 0.5 to 64 cells wide"
-        );
+    if (0.5..=64.0).contains(&eps_over_h) {
+        Ok(())
+    } else {
+        Err(Error::InterfaceWidth(eps_over_h))
     }
-    Ok(())
 }
 
 impl CommonOptions {
     /// Opens the device and notes its name.
+    ///
+    /// # Errors
+    /// A device that is not compiled in, or that does not work.
     pub fn open_device(&mut self) -> Result<ComputeDevice> {
         let device = ComputeDevice::named(self.device.as_deref())?;
         self.device = Some(device.kind().name().to_owned());
@@ -48,6 +54,9 @@ impl OperatorOptions {
     }
 
     /// Takes the width of the interface from the network, unless it is given.
+    ///
+    /// # Errors
+    /// A network that cannot be read; [`Error::InterfaceWidth`].
     pub fn fill_in(&mut self) -> Result<()> {
         if let Some(network) = &mut self.network {
             *network = absolute(&*network)?;
@@ -59,7 +68,10 @@ impl OperatorOptions {
         check_eps_over_h(self.eps_over_h())
     }
 
-    /// The step of mean curvature flow on a grid.
+    /// The scales and the step of mean curvature flow on a grid.
+    ///
+    /// # Errors
+    /// Where no network fits.
     pub fn on_grid<const D: usize>(
         &self,
         method: Method,
@@ -80,9 +92,9 @@ impl OperatorOptions {
     }
 }
 
-impl RunCommand {
+impl Command {
     /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
-    pub fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
+    pub(crate) fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
         match self {
             Self::Fair(fair) if fair.takes_small_steps() => StepRule::Graded {
                 first: Fairing::first_step(spacing),
@@ -97,7 +109,7 @@ impl RunCommand {
     }
 
     /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
-    pub fn usual_steps(&mut self) -> usize {
+    pub(crate) fn usual_steps(&mut self) -> usize {
         let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
         let energy = self.willmore().and_then(|flow| flow.energy);
         let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
@@ -126,7 +138,7 @@ impl RunCommand {
     }
 
     /// The flow from a start, and how that is shown; the rule for the time steps is filled in.
-    pub fn case<const D: usize, O: Presentation<D>>(
+    pub(crate) fn case<const D: usize, O: Presentation<D>>(
         &mut self,
         start: InitialShape<D, O>,
     ) -> Result<(Case<D>, O)> {
@@ -196,9 +208,39 @@ impl RunCommand {
     }
 }
 
+/// The targets of the sizes of the zero set: length and area in the plane, area and volume in space.
+pub(crate) struct SizeTargets {
+    perimeter: Option<SizeTarget>,
+    volume: Option<SizeTarget>,
+}
+
 impl FlowOptions {
+    /// The sizes that options name, in this dimension. In the plane `volume` is another word for the area.
+    pub(crate) fn size_targets<const D: usize>(&self) -> SizeTargets {
+        let (perimeter, volume) = if D == 2 {
+            (self.length, self.area.or(self.volume))
+        } else {
+            (self.area, self.volume)
+        };
+        SizeTargets { perimeter, volume }
+    }
+
+    /// Refuses sizes that a shape in this dimension does not have, and says which one the area is in the plane.
+    pub(crate) fn check_sizes<const D: usize>(&self, watcher: &dyn Watcher) -> Result<()> {
+        if D == 3 && self.length.is_some() {
+            return Err(Error::foreign("length", "", "a surface in space"));
+        }
+        if D == 2 && self.area.is_some() && self.volume.is_some() {
+            refuse!("in the plane `volume` is another word for `area`: give one of them");
+        }
+        if D == 2 && self.area.is_some() {
+            watcher.note(&Note::AreaInThePlane);
+        }
+        Ok(())
+    }
+
     /// The sizes that are held, from what they are at the beginning; `of_input` is the volume of the input, if the grid does not say it.
-    pub fn held<const D: usize>(
+    pub(crate) fn held<const D: usize>(
         &self,
         initial: &Stored<D>,
         eps: f64,
@@ -208,7 +250,8 @@ impl FlowOptions {
         if let Some(target) = self.reduced_volume {
             return Ok(Held::at_reduced_volume(initial, eps, target, ramp)?);
         }
-        if self.volume.is_none() && self.area.is_none() {
+        let SizeTargets { perimeter, volume } = self.size_targets::<D>();
+        if perimeter.is_none() && volume.is_none() {
             return Ok(Held::default());
         }
         let now = ZeroSet::of(initial, eps)?;
@@ -223,13 +266,13 @@ impl FlowOptions {
             })
         };
         Ok(Held {
-            perimeter: target(self.area, now.perimeter, now.perimeter),
-            volume: target(self.volume, now.volume, of_input.unwrap_or(now.volume)),
+            perimeter: target(perimeter, now.perimeter, now.perimeter),
+            volume: target(volume, now.volume, of_input.unwrap_or(now.volume)),
         })
     }
 }
 
-/// Gives the start of a flow that holds the area [round edges](engine::round_edges), if its edges are sharper than the interface is wide. The
+/// Gives the start of a flow that holds the perimeter [round edges](engine::round_edges), if its edges are sharper than the interface is wide. The
 /// area goes back to what it was, or to its target, over the steps of the ramp: the options say so then.
 ///
 /// # Errors
@@ -238,12 +281,13 @@ pub fn with_round_edges<const D: usize>(
     options: &mut FlowOptions,
     start: &mut Stored<D>,
     device: &ComputeDevice,
-    messages: MessageOptions,
+    watcher: &dyn Watcher,
 ) -> Result<()> {
-    if options.area.is_none() && options.reduced_volume.is_none() {
+    let wanted = options.size_targets::<D>();
+    if wanted.perimeter.is_none() && options.reduced_volume.is_none() {
         return Ok(());
     }
-    let holds_volume = options.volume.is_some() || options.reduced_volume.is_some();
+    let holds_volume = wanted.volume.is_some() || options.reduced_volume.is_some();
     let (scales, operator) = options.run.operator.on_grid(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
@@ -253,23 +297,36 @@ pub fn with_round_edges<const D: usize>(
     let targets = options.held(start, eps, None)?.targets();
     match engine::round_edges(start, &sharp, holds_volume, scales, operator, device)? {
         Some((rounded, round)) => {
-            let of_surface = if D == 2 { "length" } else { "area" };
-            let area = targets.perimeter.unwrap_or(sharp.perimeter);
-            messages.note(&format!(
-                "edges sharper than the interface became round: {of_surface} {:.4} instead of {:.4}; it goes to {area:.4} over the steps of --ramp",
-                round.perimeter, sharp.perimeter
-            ));
-            options.area = Some(SizeTarget::To(Amount::Value(area)));
+            let target = targets.perimeter.unwrap_or(sharp.perimeter);
+            watcher.note(&Note::RoundEdges {
+                is_curve: D == 2,
+                round: round.perimeter,
+                sharp: sharp.perimeter,
+                target,
+            });
+            let to = |value| Some(SizeTarget::To(Amount::Value(value)));
+            let (perimeter, volume) = if D == 2 {
+                (&mut options.length, &mut options.area)
+            } else {
+                (&mut options.area, &mut options.volume)
+            };
+            *perimeter = to(target);
             if options.reduced_volume.take().is_some() {
-                let volume = targets.volume.unwrap_or(sharp.volume);
-                options.volume = Some(SizeTarget::To(Amount::Value(volume)));
+                *volume = to(targets.volume.unwrap_or(sharp.volume));
             }
             *start = rounded;
         }
-        None if holds_volume => refuse!(
-            "area and volume cannot both be held: the grid does not resolve parts of the shape, and so their area; give more --cells, or hold \
-             one of them",
-        ),
+        None if holds_volume => {
+            let [boundary, inside] = if D == 2 {
+                ["length", "area"]
+            } else {
+                ["area", "volume"]
+            };
+            refuse!(
+                "{boundary} and {inside} cannot both be held: the grid does not resolve parts of the shape, and so their {boundary}; give more \
+                 `cells`, or hold one of them"
+            );
+        }
         None => (),
     }
     Ok(())

@@ -1,13 +1,13 @@
-use crate::cli::{InpaintOptions, MessageOptions};
 use crate::input::{InitialShape, Loaded};
+use crate::options::InpaintOptions;
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
 
 impl InpaintOptions {
-    pub fn check(&mut self) -> Result<()> {
+    pub(crate) fn check(&mut self) -> Result<()> {
         let Some(mask) = &self.mask else {
-            refuse!("say which region to fill: --mask IMAGE, box:x0,y0,x1,y1 or ball:x,y,r");
+            refuse!("say which region to fill: `mask` IMAGE, box:x0,y0,x1,y1 or ball:x,y,r");
         };
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -16,8 +16,8 @@ impl InpaintOptions {
         Ok(())
     }
 
-    pub fn load(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Loaded> {
-        let loaded = self.flow.run.reader(device, messages)?.load()?;
+    pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
+        let loaded = self.flow.run.reader(device, watcher)?.load()?;
         let mask = self.mask.as_deref().unwrap_or_default();
         Ok(match loaded {
             Loaded::Plane(mut start) => {
@@ -26,7 +26,7 @@ impl InpaintOptions {
                 } else {
                     start.presentation.mask(mask, start.initial.grid())?
                 };
-                start.presentation.repair(shape.as_ref(), messages)?;
+                start.presentation.repair(shape.as_ref(), watcher)?;
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
             Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
@@ -45,7 +45,7 @@ impl InpaintOptions {
         let region: NodeSet = (0..grid.len()).map(inside).collect();
         if region.is_empty() {
             refuse!(
-                "--mask {} contains no node of the box from {:?} of side {}: nothing could move",
+                "`mask` {} contains no node of the box from {:?} of side {}: nothing could move",
                 self.mask.as_deref().unwrap_or_default(),
                 grid.origin(),
                 grid.side()
@@ -70,10 +70,10 @@ impl InpaintOptions {
 /// A region that is a mask.
 fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>> {
     if !Region::is_meant(mask) {
-        refuse!("--mask {mask} is no region in {D}D: give box:... or ball:...");
+        refuse!("`mask` {mask} is no region in {D}D: give box:... or ball:...");
     }
     let region: Region = mask
         .parse()
-        .map_err(|reason| Error::options(format!("--mask: {reason}")))?;
+        .map_err(|reason| Error::options(format!("`mask`: {reason}")))?;
     Ok(region.shape::<D>()?)
 }

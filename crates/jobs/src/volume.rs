@@ -2,7 +2,7 @@
 
 use volumes::{Body, Inside, Volume};
 
-use crate::cli::{InputOptions, MessageOptions};
+use crate::options::InputOptions;
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Label;
@@ -15,7 +15,7 @@ pub fn body(path: &Path, options: &InputOptions) -> Result<Body> {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
             refuse!(
-                "--label all makes a surface of each label, and this command takes one: give its number",
+                "`label` all makes a surface of each label, and this job takes one: give its number",
             );
         }
         (None, Some(threshold)) => Inside::Above(threshold),
@@ -34,25 +34,23 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside> {
             let listed: Vec<String> = listed.map(|(label, _)| label.to_string()).collect();
             let more = if labels.len() > LISTED { ", ..." } else { "" };
             let listed = listed.join(", ");
-            format!("the values {listed}{more}: give --label N of one of them, --label all")
+            format!("the values {listed}{more}: give `label` N of one of them, `label` all")
         }
-        _ => format!("values from {low} to {high}: give --label N"),
+        _ => format!("values from {low} to {high}: give `label` N"),
     };
     refuse!(
-        "{} holds {found}, or --threshold VALUE, above which is inside",
+        "{} holds {found}, or `threshold` VALUE, above which is inside",
         path.display()
     )
 }
 
-/// Does the same with each label of a volume but 0, of which there must be some, if all are to become surfaces, and says whether they are.
-/// Where one fails it goes on with the next, until it is interrupted.
-pub fn with_each_label(
-    options: &InputOptions,
-    messages: MessageOptions,
-    mut act: impl FnMut(i64) -> Result<()>,
-) -> Result<bool> {
+/// The labels of a volume but 0, of which there must be some, if all of them are to become surfaces.
+///
+/// # Errors
+/// A file that cannot be read, or that holds no labels.
+pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
     let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
-        return Ok(false);
+        return Ok(None);
     };
     let path = absolute(input)?;
     let labels = volumes::read(&path)?.labels().unwrap_or_default();
@@ -60,28 +58,11 @@ pub fn with_each_label(
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
         refuse!(
-            "{} holds no labels, which are whole numbers other than 0: give --threshold VALUE, above which is inside",
+            "{} holds no labels, which are whole numbers other than 0: give `threshold` VALUE, above which is inside",
             path.display()
         );
     }
-    let mut failed = Vec::new();
-    for label in labels {
-        match act(label) {
-            Ok(()) => (),
-            Err(Error::Interrupted) => return Err(Error::Interrupted),
-            Err(error) => {
-                messages.warn(&format!("label {label}: {}", files::with_causes(&error)));
-                failed.push(label.to_string());
-            }
-        }
-    }
-    if !failed.is_empty() {
-        refuse!(
-            "these labels failed, as the warnings say: {}",
-            failed.join(", ")
-        );
-    }
-    Ok(true)
+    Ok(Some(labels))
 }
 
 /// The name of a file or folder for one of several labels.

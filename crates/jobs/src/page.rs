@@ -10,9 +10,10 @@ use pages::{
 };
 use report::{Axis, LineChart, Marker, Series};
 
+use crate::outcome::{self, Summary};
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{config, outcome, own, plane, presentation};
+use crate::{own, plane, presentation, settings};
 
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
 const MOST_FRAMES: usize = 60;
@@ -23,7 +24,10 @@ const MOST_ROWS: usize = 60;
 /// Curves through fewer steps have a mark at each.
 const FEW_STEPS: usize = 40;
 
-/// Writes the page of a run.
+/// Writes the page of a run, `index.html`, into its folder.
+///
+/// # Errors
+/// Files of the run that are missing or damaged.
 pub fn write(run: &StoredRun) -> Result<()> {
     let records = engine::records(run)?;
     let page = Files { run, records }.page()?;
@@ -39,7 +43,7 @@ impl Files<'_> {
     fn page(&self) -> Result<Page> {
         let about = &engine::notes(self.run)["about"];
         let text = |name: &str| about[name].as_str().unwrap_or_default();
-        let outcome: Option<Value> = (self.read(presentation::SUMMARY)?)
+        let outcome: Option<Summary> = (self.read(presentation::SUMMARY)?)
             .map(|bytes| serde_json::from_slice(&bytes))
             .transpose()
             .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
@@ -51,11 +55,11 @@ impl Files<'_> {
         if !self.records.is_empty() {
             page = page.with(self.steps()?);
         }
-        let options: Value = toml::from_str(&self.run.read_text(config::FILE)?)
+        let options: Value = toml::from_str(&self.run.read_text(settings::FILE)?)
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
-            numbers.push(facts(outcome));
+            numbers.push(facts(&outcome.to_json()));
         }
         let options = Section::new("Options").with(facts(&options));
         let program = Section::new("Program, network and device").with(facts(about));
@@ -189,15 +193,15 @@ impl Files<'_> {
     }
 
     /// What came out, in words.
-    fn lead(&self, outcome: Option<&Value>) -> String {
+    fn lead(&self, outcome: Option<&Summary>) -> String {
         let last = self.records.last();
         let (step, time) = last.map_or((0, 0.0), |last| (last.step, last.time));
         let progress = outcome::progress(step, time);
         let Some(outcome) = outcome else {
             return format!("Not finished: {progress} so far.");
         };
-        let vanished = (outcome["components"] == 0).then(|| "the shape has vanished".to_owned());
-        let sentences = outcome::sentences(outcome).into_iter().chain(vanished);
+        let vanished = (outcome.components == 0).then(|| "the shape has vanished".to_owned());
+        let sentences = outcome.sentences().into_iter().chain(vanished);
         sentences.fold(progress, |lead, sentence| lead + "; " + &sentence) + "."
     }
 

@@ -2,9 +2,8 @@
 
 pub mod about;
 pub mod check;
-pub mod fair;
-pub mod flow;
-pub mod inpaint;
+pub mod labels;
 pub mod resume;
+pub mod run;
 pub mod sample;
 pub mod train;

@@ -1,21 +1,38 @@
-//! `willmore flow`, and what it has in common with the other commands that make runs.
+//! Jobs that make runs, from their options to the first step.
 
 use engine::{Flow, Storage, Store};
 
 use crate::case::with_round_edges;
-use crate::cli::{McfOptions, MessageOptions, RunCommand, RunOptions};
-use crate::config;
+use crate::command::Command;
 use crate::input::{InitialShape, Loaded, Reader};
+use crate::options::{ForceOption, McfOptions, RunOptions};
+use crate::outcome::Outcome;
 use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation};
 use crate::run::{Plan, free_folder, make_way};
+use crate::settings;
 use crate::space::Space;
-use crate::values::Label;
-use crate::volume;
 
-impl RunCommand {
+impl ForceOption {
+    /// Refuses a file to save that is there, or whose folder is not.
+    ///
+    /// # Errors
+    /// [`Error::NoFolder`], [`Error::Exists`]
+    pub fn check(self, path: &Path) -> Result<()> {
+        let folder = path.parent().unwrap_or(path);
+        if !(folder.as_os_str().is_empty() || folder.is_dir()) {
+            return Err(Error::NoFolder(path.to_owned()));
+        }
+        if path.exists() && !self.force {
+            return Err(Error::Exists(path.to_owned()));
+        }
+        Ok(())
+    }
+}
+
+impl Command {
     /// Refuses options before anything is read.
     fn check(&mut self) -> Result<()> {
         match self {
@@ -28,7 +45,7 @@ impl RunCommand {
                     options.network.is_some() || options.formulation != Formulation::Accurate;
                 if chosen && !method.is_learned() {
                     refuse!(
-                        "--network and --scheme have no meaning for finite elements: leave them out, or choose --method network"
+                        "`network` and `scheme` have no meaning for finite elements: leave them out, or choose `method` network"
                     );
                 }
             }
@@ -41,14 +58,16 @@ impl RunCommand {
             && flow.tau.unwrap_or(usual) != StepRule::Controlled
         {
             refuse!(
-                "--tolerance {tolerance} is for controlled time steps: give --tau controlled, or leave it out"
+                "`tolerance` {tolerance} is for controlled time steps: give `tau` controlled, or leave it out"
             );
         }
-        if let (Some(ramp), None, None, None) =
-            (flow.ramp, flow.volume, flow.area, flow.reduced_volume)
+        let sizes = [flow.length, flow.area, flow.volume];
+        if let Some(ramp) = flow.ramp
+            && flow.reduced_volume.is_none()
+            && sizes.iter().all(Option::is_none)
         {
             refuse!(
-                "--ramp {ramp} is for sizes that go to a target: give --volume, --area or --reduced-volume, or leave it out"
+                "`ramp` {ramp} is for sizes that go to a target: give `length`, `area`, `volume` or `reduced_volume`, or leave it out"
             );
         }
         Ok(())
@@ -57,84 +76,37 @@ impl RunCommand {
 
 impl RunOptions {
     /// Reads the input, for Willmore flow on a device.
-    pub fn reader(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Reader<'_>> {
-        let mut reader = Reader::of(&mut self.input, self.operator.eps_over_h(), messages)?;
+    pub(crate) fn reader<'a>(
+        &'a mut self,
+        device: DeviceKind,
+        watcher: &'a dyn Watcher,
+    ) -> Result<Reader<'a>> {
+        let mut reader = Reader::of(&mut self.input, self.operator.eps_over_h(), watcher)?;
         let is_dense = self.operator.storage == Some(Storage::Dense);
         reader.whole = is_dense.then_some((device, Flow::Willmore));
         Ok(reader)
     }
 }
 
-/// Makes a run, or continues one that is stored, perhaps to more steps.
-pub fn run(
-    mut command: RunCommand,
-    messages: MessageOptions,
-    stored: Option<(StoredRun, Option<usize>)>,
-) -> Result<()> {
-    let input = command.options().input.clone();
-    let mut is_first = true;
-    let of_label = |label| {
-        // A signal may have come after the last step of the label before. Before the first one none is caught: it ends the reading at once.
-        if !std::mem::take(&mut is_first) && Interrupt::catch()?.requested() {
-            messages.note(&format!("interrupted before label {label}"));
-            return Err(Error::Interrupted);
-        }
-        let mut one = command.clone();
-        let options = one.options();
-        options.input.label = Some(Label::One(label));
-        for name in options.output.iter_mut().chain(&mut options.save) {
-            *name = volume::named(name, label);
-        }
-        run(one, messages, None)
-    };
-    if volume::with_each_label(&input, messages, of_label)? {
-        return Ok(());
-    }
+/// Makes a run in a folder, from its beginning.
+///
+/// # Errors
+/// Refused options or input; whatever stops a flow. [`Error::Interrupted`] is none of them: an interrupted run is an outcome without a summary.
+pub fn start(mut command: Command, watcher: &dyn Watcher) -> Result<Outcome> {
     command.check()?;
     let steps = command.usual_steps();
-    let options = command.options();
-    options.steps.get_or_insert(steps);
-    if let Some((stored, more)) = &stored {
-        // A run that has gone on once notes its steps.
-        let noted = engine::notes(stored)["steps"].as_u64();
-        let steps = more.or(noted.map(|steps| steps as usize));
-        options.steps = steps.or(options.steps);
-    }
-    options.operator.fill_in()?;
-    // That its folder is gone is no reason not to go on with a run.
-    let is_gone = |save: &mut PathBuf| stored.is_some() && !save.parent().is_some_and(Path::is_dir);
-    if let Some(save) = options.save.take_if(is_gone) {
-        let shown = save.display();
-        messages.warn(&format!(
-            "nothing will be saved to {shown}: its folder is gone"
-        ));
-    }
-    if let Some(save) = &mut options.save {
-        *save = absolute(&*save)?;
-        options.force.check(save)?;
-    }
-    let device = options.common.open_device()?;
-    let mut job = Job {
-        command,
-        device,
-        messages,
-    };
-    if let Some((stored, more)) = stored {
-        return match engine::dimension(&stored)? {
-            2 => job.resume::<2, Plane>(stored, more),
-            _ => job.resume::<3, Space>(stored, more),
-        };
-    }
+    command.options().steps.get_or_insert(steps);
+    let mut job = Job::new(command, watcher)?;
     let kind = job.device.kind();
     let loaded = match &mut job.command {
-        RunCommand::Fair(fair) => fair.load(kind, messages),
-        RunCommand::Inpaint(inpaint) => inpaint.load(kind, messages),
-        RunCommand::Mcf(mcf) => {
-            let mut reader = mcf.run.reader(kind, messages)?;
+        Command::Fair(fair) => fair.load(kind, watcher),
+        Command::Inpaint(inpaint) => inpaint.load(kind, watcher),
+        Command::Mcf(mcf) => {
+            let mut reader = mcf.run.reader(kind, watcher)?;
             reader.whole = Some((kind, Flow::MeanCurvature));
             reader.load()
         }
-        RunCommand::Flow(flow) => flow.run.reader(kind, messages)?.load(),
+        Command::Flow(flow) => flow.run.reader(kind, watcher)?.load(),
     };
     match loaded? {
         Loaded::Plane(start) => job.start(start),
@@ -142,35 +114,81 @@ pub fn run(
     }
 }
 
-struct Job {
-    command: RunCommand,
-    device: ComputeDevice,
-    messages: MessageOptions,
+/// Continues a stored run, perhaps to more steps, with the options that it [was started with](settings::stored).
+///
+/// # Errors
+/// As [`start`], and for folders that hold no such run.
+pub fn resume(
+    mut command: Command,
+    stored: StoredRun,
+    more: Option<usize>,
+    watcher: &dyn Watcher,
+) -> Result<Outcome> {
+    command.check()?;
+    let usual = command.usual_steps();
+    let options = command.options();
+    // A run that has gone on once notes its steps.
+    let noted = engine::notes(&stored)["steps"].as_u64();
+    let noted = noted.map(|steps| steps as usize);
+    options.steps = more.or(noted).or(options.steps).or(Some(usual));
+    // That its folder is gone is no reason not to go on with a run.
+    let is_gone = |save: &mut PathBuf| !save.parent().is_some_and(Path::is_dir);
+    if let Some(path) = options.save.take_if(is_gone) {
+        watcher.warning(&Warning::FolderGone { path });
+    }
+    let job = Job::new(command, watcher)?;
+    match engine::dimension(&stored)? {
+        2 => job.resume::<2, Plane>(stored, more),
+        _ => job.resume::<3, Space>(stored, more),
+    }
 }
 
-impl Job {
+struct Job<'a> {
+    command: Command,
+    device: ComputeDevice,
+    watcher: &'a dyn Watcher,
+}
+
+impl<'a> Job<'a> {
+    fn new(mut command: Command, watcher: &'a dyn Watcher) -> Result<Self> {
+        let options = command.options();
+        options.operator.fill_in()?;
+        if let Some(save) = &mut options.save {
+            *save = absolute(&*save)?;
+            options.force.check(save)?;
+        }
+        let device = options.common.open_device()?;
+        Ok(Self {
+            command,
+            device,
+            watcher,
+        })
+    }
+
     fn start<const D: usize, O: Presentation<D>>(
         mut self,
         mut start: InitialShape<D, O>,
-    ) -> Result<()> {
+    ) -> Result<Outcome> {
         let options = self.command.options();
         start.presentation.turn(&mut options.up)?;
         options.save.as_deref().map_or(Ok(()), O::check_saved)?;
-        if let RunCommand::Flow(options) = &mut self.command {
-            with_round_edges(options, &mut start.initial, &self.device, self.messages)?;
+        if let Some(options) = self.command.willmore() {
+            options.check_sizes::<D>(self.watcher)?;
+        }
+        if let Command::Flow(options) = &mut self.command {
+            with_round_edges(options, &mut start.initial, &self.device, self.watcher)?;
         }
         let (case, presentation) = self.command.case(start)?;
         // The options of which the same run can be made again.
         let mut noted = self.command.clone();
-        // Standard output is not there any more when a run is resumed.
-        if self.messages.to_pipe {
+        if noted.options().saves_once {
             noted.options().save = None;
         }
         // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
-        if matches!(&noted, RunCommand::Fair(fair) if !fair.ends) {
+        if matches!(&noted, Command::Fair(fair) if !fair.ends) {
             noted.options().steps = None;
         }
-        let options = config::resolved(noted.name(), &noted)?;
+        let options = settings::resolved(&noted)?;
         let plan = self.plan(presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
@@ -182,7 +200,7 @@ impl Job {
             make_way(&folder, &plan.options.input)?;
         }
         let inputs = plan.presentation.inputs()?;
-        let mut files = vec![(config::FILE, options.as_bytes())];
+        let mut files = vec![(settings::FILE, options.as_bytes())];
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
         plan.go_on(store, run)
@@ -193,7 +211,7 @@ impl Job {
         mut self,
         stored: StoredRun,
         more: Option<usize>,
-    ) -> Result<()> {
+    ) -> Result<Outcome> {
         let mut notes = engine::notes(&stored).clone();
         let name = notes["about"]["name"].as_str().unwrap_or("run").to_owned();
         let mut presentation = O::deserialize(&notes["presentation"]).map_err(|reason| {
@@ -226,9 +244,9 @@ impl Job {
         plan.go_on(store, run)
     }
 
-    fn plan<const D: usize, O>(&mut self, presentation: O) -> Plan<D, O> {
+    fn plan<const D: usize, O>(&mut self, presentation: O) -> Plan<'a, D, O> {
         let format = match &self.command {
-            RunCommand::Fair(fair) => fair.format.clone(),
+            Command::Fair(fair) => fair.format.clone(),
             _ => None,
         };
         Plan {
@@ -236,7 +254,7 @@ impl Job {
             presentation,
             format,
             options: self.command.options().clone(),
-            messages: self.messages,
+            watcher: self.watcher,
         }
     }
 }

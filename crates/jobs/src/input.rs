@@ -7,7 +7,8 @@ use images::{Outline, Side, Tones};
 use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
 
-use crate::cli::{Holds, InputOptions, Inside, MessageOptions};
+use crate::events::{GridDistance, Loss, ThinParts};
+use crate::options::{FieldKind, InputOptions, Inside};
 use crate::own::{OwnMesh, thinnest};
 use crate::paths::{absolute, extension};
 use crate::plane::Plane;
@@ -29,6 +30,26 @@ pub struct InitialShape<const D: usize, O> {
 pub enum Loaded {
     Plane(InitialShape<2, Plane>),
     Space(InitialShape<3, Space>),
+}
+
+/// A shape on a grid, in the dimension of the input.
+#[derive(Clone, Debug)]
+pub enum Opened {
+    /// A curve.
+    Plane(Stored<2>),
+    /// A surface.
+    Space(Stored<3>),
+}
+
+/// The phase field of an input, with interfaces so many cells wide; the grid is chosen unless the options say it, and noted there.
+///
+/// # Errors
+/// Refused options or input.
+pub fn open(options: &mut InputOptions, eps_over_h: f64, watcher: &dyn Watcher) -> Result<Opened> {
+    Ok(match Reader::of(options, eps_over_h, watcher)?.load()? {
+        Loaded::Plane(start) => Opened::Plane(start.initial),
+        Loaded::Space(start) => Opened::Space(start.initial),
+    })
 }
 
 /// What an input is; the paths of files are absolute.
@@ -71,12 +92,13 @@ const MOST_RAYS: usize = 4096;
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
-/// What becomes of thin parts of a surface.
-const WILL_NOT_LAST: &str = "which will not last";
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
 
-/// The usual format of what becomes of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
+/// The usual format of the result of an input: that of a mesh, otherwise PLY in space and PNG in the plane.
+///
+/// # Errors
+/// A text that is no input.
 pub fn usual_format(input: &str) -> Result<String> {
     Ok(match Source::of(input)? {
         Source::Mesh(path) => extension(&path),
@@ -86,17 +108,23 @@ pub fn usual_format(input: &str) -> Result<String> {
 }
 
 /// The closed mesh in a file, possibly after a repair.
-pub fn closed(path: &Path, repairs: bool, messages: MessageOptions) -> Result<ClosedMesh> {
+pub fn closed(path: &Path, repairs: bool, watcher: &dyn Watcher) -> Result<ClosedMesh> {
     let mesh = surfaces::read(path)?;
-    let warn = |what: &dyn std::fmt::Display| messages.warn(&format!("{}: {what}", path.display()));
     if repairs {
         let repaired = surfaces::repair(&mesh, REPAIR_CELLS)?;
-        warn(&repaired);
+        watcher.warning(&Warning::Repaired {
+            path: path.to_owned(),
+            changes: repaired.changes,
+        });
         return Ok(repaired.mesh);
     }
-    let (mesh, warnings) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
-    for warning in &warnings {
-        warn(warning);
+    let (mesh, changes) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
+    for change in changes {
+        watcher.warning(&Warning::Mended {
+            path: path.to_owned(),
+            change,
+            only_for_flow: false,
+        });
     }
     Ok(mesh)
 }
@@ -115,14 +143,9 @@ impl Source {
             "tif" | "tiff" if volumes::is_stack(&path) => Self::Volume(path),
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(path),
             "npy" => Self::Field(path),
-            "vti" => refuse!(
-                "{input} is for ParaView and is not read: give the same values as .npy, such as the final.npy beside a final.vti"
-            ),
+            "vti" => return Err(Error::ParaView(input.to_owned())),
             "nii" | "gz" | "mrc" | "map" => Self::Volume(path),
-            _ => refuse!(
-                "{input} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), \
-                 a volume (.nii, .nii.gz, .mrc, .map, .tif of several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
-            ),
+            _ => return Err(Error::UnknownInput(input.to_owned())),
         })
     }
 
@@ -167,23 +190,23 @@ impl Source {
     /// Refuses options that say nothing about such an input.
     fn refuse_foreign(&self, options: &InputOptions) -> Result<()> {
         let (what, allowed): (_, &[&str]) = match self {
-            Self::Mesh(_) => ("a mesh", &["--repair", "--side-length"]),
-            Self::Image(_) => ("an image", &["--inside", "--threshold", "--side-length"]),
-            Self::Field(_) => ("a field", &["--holds"]),
-            Self::Volume(_) => ("a volume", &["--threshold", "--label", "--side-length"]),
-            Self::BuiltIn(_) => ("a built-in shape", &["--side-length"]),
+            Self::Mesh(_) => ("a mesh", &["repair", "side_length"]),
+            Self::Image(_) => ("an image", &["inside", "threshold", "side_length"]),
+            Self::Field(_) => ("a field", &["field_kind"]),
+            Self::Volume(_) => ("a volume", &["threshold", "label", "side_length"]),
+            Self::BuiltIn(_) => ("a built-in shape", &["side_length"]),
             Self::Region(_) => ("a region", &[]),
         };
         for (name, given) in [
-            ("--inside", options.inside.is_some()),
-            ("--threshold", options.threshold.is_some()),
-            ("--label", options.label.is_some()),
-            ("--holds", options.holds.is_some()),
-            ("--repair", options.repair),
-            ("--side-length", options.side_length.is_some()),
+            ("inside", options.inside.is_some()),
+            ("threshold", options.threshold.is_some()),
+            ("label", options.label.is_some()),
+            ("field_kind", options.field_kind.is_some()),
+            ("repair", options.repair),
+            ("side_length", options.side_length.is_some()),
         ] {
             if given && !allowed.contains(&name) {
-                refuse!("{name} has no meaning for {what}: leave it out");
+                return Err(Error::foreign(name, "", what));
             }
         }
         Ok(())
@@ -201,7 +224,7 @@ pub struct Reader<'a> {
     /// The cells per unit length that were chosen, if any; the options may hold others that are tried.
     chosen: Option<usize>,
     eps_over_h: f64,
-    messages: MessageOptions,
+    watcher: &'a dyn Watcher,
 }
 
 /// Cells per unit length and side of the box, unless they are chosen.
@@ -214,12 +237,10 @@ impl<'a> Reader<'a> {
     pub fn of(
         options: &'a mut InputOptions,
         eps_over_h: f64,
-        messages: MessageOptions,
+        watcher: &'a dyn Watcher,
     ) -> Result<Self> {
         let Some(input) = options.input.as_deref() else {
-            refuse!(
-                "there is no input: give a file or builtin:NAME, or `input = ...` in a --config file"
-            );
+            return Err(Error::NoInput);
         };
         let source = Source::of(input)?;
         source.refuse_foreign(options)?;
@@ -233,7 +254,7 @@ impl<'a> Reader<'a> {
             chosen: options.cells,
             options,
             eps_over_h,
-            messages,
+            watcher,
         })
     }
 
@@ -241,7 +262,7 @@ impl<'a> Reader<'a> {
         let is_planar = self.source.is_planar()?;
         Ok(match self.source.clone() {
             Source::Mesh(path) => {
-                let mesh = closed(&path, self.options.repair, self.messages)?;
+                let mesh = closed(&path, self.options.repair, self.watcher)?;
                 self.mesh(&mesh, surfaces::usual_up_axis(&path)?)?
             }
             Source::Image(path) => self.image(&path)?,
@@ -259,17 +280,19 @@ impl<'a> Reader<'a> {
         let (cells, box_side) = usual_box::<D>();
         let cells = *self.options.cells.get_or_insert(cells);
         if cells < FEWEST_CELLS {
-            refuse!(
-                "--cells {cells} resolves nothing: use at least {FEWEST_CELLS} per unit length"
-            );
+            let fewest = FEWEST_CELLS;
+            return Err(Error::TooFewCells { cells, fewest });
         }
         let box_side = *self.options.box_side.get_or_insert(box_side);
         let grid = Grid::<D>::per_unit(cells, box_side)?.with_origin([-0.5 * box_side; D])?;
         let nodes = (grid.cells() as f64).powi(D as i32);
         if nodes > MOST_NODES {
-            refuse!(
-                "--cells {cells} makes {nodes:.1e} nodes in a box of side {box_side}, more than {MOST_NODES:.1e}: use fewer"
-            );
+            return Err(Error::TooManyNodes {
+                cells,
+                nodes,
+                box_side,
+                most: MOST_NODES,
+            });
         }
         if let Some((device, flow)) = self.whole {
             let nodes = grid.len();
@@ -326,18 +349,19 @@ impl<'a> Reader<'a> {
             let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
             Ok(((grid, thin), thin < THIN_PART))
         })?;
-        self.tell_thin(thin, &grid, WILL_NOT_LAST, self.chosen.is_none())?;
+        self.tell_thin(thin, &grid, false, self.chosen.is_none())?;
         Ok(grid)
     }
 
     /// The phase field of a mesh on the coarsest of some grids about it that has its components and holes, and the surface there, unless it touches
-    /// itself. Where even the last one does not have them this is told, or refused with some advice.
+    /// itself. Where even the last one does not have them this is told, or refused.
     fn like_mesh(
         &mut self,
         mesh: &ClosedMesh,
         part: f64,
         grids: &[usize],
-        refused: Option<&str>,
+        refuses: bool,
+        vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
         let (field, surface, found) = self.first_good(grids, |reader| {
@@ -349,19 +373,22 @@ impl<'a> Reader<'a> {
             Ok(((field, surface, found), found == Some(wanted)))
         })?;
         if found != Some(wanted) {
-            let thin = thinnest(field.grid());
-            let message = format!(
-                "with --cells {} parts and gaps thinner than {thin:.3e} ({:.2} % of the longest side) are lost: the mesh has {wanted}, the \
-                 grid {}; its surface is {}",
-                self.cells(),
-                100.0 * thin / mesh.bounding_box().longest_side(),
-                found.unwrap_or_default(),
-                far_from(mesh, surface.as_ref(), &field),
-            );
-            if let Some(advice) = refused {
-                refuse!("{message}; {advice}");
+            let loss = Loss {
+                cells: self.cells(),
+                thinnest: thinnest(field.grid()),
+                longest_side: mesh.bounding_box().longest_side(),
+                of_mesh: wanted,
+                on_grid: found.unwrap_or_default(),
+                distance: far_from(mesh, surface.as_ref(), &field),
+            };
+            if refuses {
+                return Err(Error::Lost {
+                    loss: Box::new(loss),
+                    may_allow: self.allows_loss.is_some(),
+                    vertices_follow,
+                });
             }
-            self.messages.warn(&message);
+            self.watcher.warning(&Warning::Lost(loss));
         }
         Ok((field, surface))
     }
@@ -375,33 +402,31 @@ impl<'a> Reader<'a> {
         THIN * self.eps_over_h * grid.spacing()
     }
 
-    /// What else allows losses, for advice.
-    fn or_allow_loss(&self) -> &'static str {
-        self.allows_loss.map_or("", |_| " or --allow-loss")
-    }
-
     /// Says that so much of the boundary is thin, if it is much, or refuses to lose even more unless the grid was chosen or losses are allowed.
     fn tell_thin<const D: usize>(
         &self,
         part: f64,
         grid: &Grid<D>,
-        what: &str,
+        vertices_follow: bool,
         refuses: bool,
     ) -> Result<()> {
         if part < THIN_PART {
             return Ok(());
         }
-        let message = format!(
-            "{:.1} % of the boundary is at parts or gaps thinner than {:.3e}, {THIN} interface widths with --cells {}, {what}",
-            100.0 * part,
-            self.thin_below(grid),
-            self.cells(),
-        );
+        let thin = ThinParts {
+            part,
+            below: self.thin_below(grid),
+            widths: THIN,
+            cells: self.cells(),
+            vertices_follow,
+        };
         if refuses && self.allows_loss != Some(true) && part >= MOST_LOST {
-            let or = self.or_allow_loss();
-            refuse!("{message}: give a larger --side-length, or --cells{or} to go on all the same");
+            return Err(Error::Thin {
+                thin: Box::new(thin),
+                may_allow: self.allows_loss.is_some(),
+            });
         }
-        self.messages.warn(&message);
+        self.watcher.warning(&Warning::Thin(thin));
         Ok(())
     }
 
@@ -413,13 +438,8 @@ impl<'a> Reader<'a> {
         let coarsest = self.cells();
         let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
         let grids: Vec<usize> = grids.filter(|&cells| cells >= coarsest).collect();
-        let advice = format!(
-            "give a larger --side-length or more --cells, or these --cells{} to go on without them",
-            self.or_allow_loss()
-        );
-        let refused = self.chosen.is_none() && self.allows_loss != Some(true);
-        let refused = refused.then_some(&*advice);
-        let (field, _) = self.like_mesh(mesh, PART, &grids, refused)?;
+        let refuses = self.chosen.is_none() && self.allows_loss != Some(true);
+        let (field, _) = self.like_mesh(mesh, PART, &grids, refuses, false)?;
         let space = Space {
             up,
             input: Some(Topology::of(mesh)),
@@ -432,24 +452,17 @@ impl<'a> Reader<'a> {
     pub fn own(&mut self, own: OwnMesh, path: &Path) -> Result<Loaded> {
         let (rough, start) = (own.rough(), &own.fairing().start);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
-        let advice = "use more --cells, or --allow-loss to go on without them";
-        let refused = (self.allows_loss != Some(true)).then_some(advice);
-        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refused)?;
+        let refuses = self.allows_loss != Some(true);
+        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refuses, true)?;
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);
         let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
-        let what = if own.is_new {
-            WILL_NOT_LAST
-        } else {
-            "where vertices follow less well"
-        };
-        self.tell_thin(thin, grid, what, false)?;
-        self.messages.note(&format!(
-            "grid: {} cells per unit length, {:.3e} wide (--cells); its surface is {}",
-            self.cells(),
-            grid.spacing(),
-            far_from(start, surface.as_ref(), &field)
-        ));
+        self.tell_thin(thin, grid, !own.is_new, false)?;
+        self.watcher.note(&Note::Grid {
+            cells: self.cells(),
+            spacing: grid.spacing(),
+            distance: far_from(start, surface.as_ref(), &field),
+        });
         let region = own.nodes(grid);
         let presentation = Space {
             up: surfaces::usual_up_axis(path)?,
@@ -480,10 +493,11 @@ impl<'a> Reader<'a> {
         };
         let side = *self.options.side_length.get_or_insert(usual);
         if !(side > 0.0 && side <= most) {
-            refuse!(
-                "--side-length {side} does not fit the box of side {box_side}, whose sides are to be an interface width away: give a \
-                 positive length of at most {most:.4}"
-            );
+            return Err(Error::SideLength {
+                side,
+                box_side,
+                most,
+            });
         }
         Ok(side)
     }
@@ -548,16 +562,13 @@ impl<'a> Reader<'a> {
         let tones = Tones::of(&image, side);
         let is_said = self.options.inside.is_some() || self.options.threshold.is_some();
         if tones.between >= PHOTOGRAPH && !is_said {
-            refuse!(
-                "{} has continuous tones, as a photograph: {:.0} % of its pixels have none of two. A shape has two: with --threshold {:.2}, \
-                 which separates them best, the pixels {}, {:.0} % of all, would be inside, and all other tones of them would be lost; say so \
-                 by --threshold or --inside",
-                path.display(),
-                100.0 * tones.between,
-                tones.threshold,
-                side.at(tones.threshold),
-                100.0 * tones.inside,
-            );
+            return Err(Error::Photograph {
+                path: path.to_owned(),
+                between: tones.between,
+                threshold: tones.threshold,
+                side: side.at(tones.threshold).to_string(),
+                inside: tones.inside,
+            });
         }
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
         let distance = outline.distance();
@@ -580,10 +591,10 @@ impl<'a> Reader<'a> {
         let grid = self.grid_holding(&bounds, grids, &distance, &sides)?;
         let wide = grid.spacing() / body.voxel;
         if wide > 1.5 {
-            self.messages.note(&format!(
-                "a cell is {wide:.1} voxels wide: with more --cells than {} smaller details last",
-                self.cells()
-            ));
+            self.watcher.note(&Note::CoarserThanVoxels {
+                voxels: wide,
+                cells: self.cells(),
+            });
         }
         let field = self.mesh_field(&body.surface, grid)?;
         let voxels = Some(Voxels {
@@ -593,10 +604,10 @@ impl<'a> Reader<'a> {
             time: None,
         });
         if body.specks > 0 {
-            self.messages.warn(&format!(
-                "{} parts or holes of a few voxels are left out, which changes the volume by {:+} voxels",
-                body.specks, body.filled
-            ));
+            self.watcher.warning(&Warning::Specks {
+                count: body.specks,
+                filled: body.filled,
+            });
         }
         let space = Space {
             voxels,
@@ -606,17 +617,14 @@ impl<'a> Reader<'a> {
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Stored<3>> {
-        let progress = self.messages.progress();
-        let bar = progress.bar("signed distance", grid.cells() as u64);
         let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
-        let distance = distance.sample_within(PURE_BEYOND * eps, grid, &|| bar.inc(1))?;
-        bar.finish();
-        progress.clear();
-        let (distance, mended) = surfaces::mend_signs(distance);
-        if mended > 0 {
-            self.messages.warn(&format!(
-                "the mesh crosses itself: {mended} nodes of the grid, which its faces put on the wrong side, were put right"
-            ));
+        let progress = self.watcher.begins("signed distance", grid.cells() as u64);
+        let layer_done = || progress.advance();
+        let distance = distance.sample_within(PURE_BEYOND * eps, grid, &layer_done)?;
+        drop(progress);
+        let (distance, nodes) = surfaces::mend_signs(distance);
+        if nodes > 0 {
+            self.watcher.warning(&Warning::SignsMended { nodes });
         }
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
@@ -625,15 +633,16 @@ impl<'a> Reader<'a> {
         &mut self,
         path: &Path,
     ) -> Result<InitialShape<D, O>> {
-        let is_phase = *self.options.holds.get_or_insert(Holds::PhaseField) == Holds::PhaseField;
+        let kind = *self.options.field_kind.get_or_insert(FieldKind::PhaseField);
+        let is_phase = kind == FieldKind::PhaseField;
         let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
         let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;
         let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
         if let (true, Some(value)) = (is_phase, outside) {
-            refuse!(
-                "{} holds the value {value}, which no phase field has; give --holds distance if these are signed distances",
-                path.display()
-            );
+            return Err(Error::NoPhase {
+                path: path.to_owned(),
+                value: *value,
+            });
         }
         if self.options.cells.is_some() {
             // Distances are linear across the interface, as what lies between the nodes is taken to be.
@@ -652,27 +661,27 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// How far the surface of a phase field is from a mesh, in words.
-fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>, field: &Stored<3>) -> String {
+/// How far the surface of a phase field is from a mesh.
+fn far_from(mesh: &ClosedMesh, surface: Option<&ClosedMesh>, field: &Stored<3>) -> GridDistance {
     match surface {
-        Some(surface) => {
-            let far = hausdorff_distance(surface, mesh);
-            let percent = 100.0 * far / mesh.bounding_box().longest_side();
-            format!("at most {far:.3e} ({percent:.3} % of the longest side) from that of the mesh")
-        }
-        None if has_interface(field) => "one that touches itself".to_owned(),
-        None => "not there at all".to_owned(),
+        Some(surface) => GridDistance::AtMost {
+            length: hausdorff_distance(surface, mesh),
+            longest_side: mesh.bounding_box().longest_side(),
+        },
+        None if has_interface(field) => GridDistance::TouchesItself,
+        None => GridDistance::Nothing,
     }
 }
 
 /// Refuses shapes of which there is nothing on the grid, or nothing else.
 pub fn check_phases<const D: usize>(u: &impl PhaseField<D>, input: &str) -> Result<()> {
-    if !has_interface(u) {
-        let nodes = u.nodes().grid().len();
-        let inside = if u.at([0; D]) > 0.0 { nodes } else { 0 };
-        refuse!(
-            "{input} has {inside} of {nodes} nodes inside, so that there is nothing to move: use more --cells, or another size"
-        );
+    if has_interface(u) {
+        return Ok(());
     }
-    Ok(())
+    let nodes = u.nodes().grid().len();
+    Err(Error::NothingMoves {
+        input: input.to_owned(),
+        inside: if u.at([0; D]) > 0.0 { nodes } else { 0 },
+        nodes,
+    })
 }

@@ -7,18 +7,27 @@ use derive_more::Display;
 use crate::prelude::*;
 
 /// A finite number.
+///
+/// # Errors
+/// A text that is none.
 pub fn finite(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite());
     value.ok_or_else(|| "it must be a finite number".to_owned())
 }
 
 /// A finite number above 0.
+///
+/// # Errors
+/// A text that is none.
 pub fn positive(text: &str) -> Result<f64, String> {
     let value = finite(text).ok().filter(|value| *value > 0.0);
     value.ok_or_else(|| "it must be positive".to_owned())
 }
 
 /// A whole number above 0.
+///
+/// # Errors
+/// A text that is none.
 pub fn count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("it must be at least 1".to_owned()),
@@ -29,7 +38,9 @@ pub fn count(text: &str) -> Result<usize, String> {
 /// A value in the units of the input, or a part of another one in percent.
 #[derive(Clone, Copy, Debug, PartialEq, Display)]
 pub enum Amount {
+    /// In the units of the input.
     Value(f64),
+    /// In percent of another one.
     #[display("{_0}%")]
     Percent(f64),
 }
@@ -52,6 +63,10 @@ impl Amount {
         }
     }
 
+    /// A length, or a part of the motion.
+    ///
+    /// # Errors
+    /// A text that is neither.
     pub fn tolerance(text: &str) -> Result<Self, String> {
         let expected = "a length, or a part of the motion in percent, such as 2%";
         Self::parse(text, expected)
@@ -94,6 +109,7 @@ pub enum Label {
     /// Each but 0 becomes a surface of its own.
     #[display("all")]
     All,
+    /// This one.
     #[serde(untagged)]
     One(i64),
 }
@@ -111,14 +127,17 @@ impl FromStr for Label {
 }
 
 /// What an inpainted region holds at the beginning.
-#[derive(Clone, Debug, PartialEq, Display)]
+#[derive(Clone, Debug, Default, PartialEq, Display)]
 #[display(rename_all = "lowercase")]
 pub enum Ansatz {
+    /// The shape itself.
+    #[default]
     Keep,
     /// Nothing.
     Empty,
     /// All inside.
     Full,
+    /// This region.
     #[display("{_0}")]
     Shape(Region),
 }

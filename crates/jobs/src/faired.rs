@@ -20,7 +20,7 @@ pub struct Faired {
     pub file: Option<(String, Vec<u8>)>,
     pub mesh: TriangleMesh,
     pub displacement: Figure,
-    pub report: Value,
+    pub report: MeshReport,
 }
 
 impl Faired {
@@ -33,7 +33,7 @@ impl Faired {
         Ok(Self {
             file: None,
             displacement: figure(&mesh, &lengths, &none_lost, up)?,
-            report: report(before, &mesh, &lengths),
+            report: MeshReport::new(before, &mesh, &lengths),
             mesh,
         })
     }
@@ -59,27 +59,62 @@ pub fn surface(u: &Stored<3>, eps: f64) -> Result<TriangleMesh> {
     })
 }
 
-/// How a mesh whose vertices are that far from the surface `before` differs from that.
-pub fn report(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Value {
-    let mut report = json!({});
-    let side = before.bounding_box().longest_side();
-    let mut add = |name: &str, length: f64| {
-        report[name] = length.into();
-        report[&format!("{name}_percent")] = (100.0 * length / side).into();
-    };
-    let squares: f64 = lengths.iter().map(|length| length * length).sum();
-    let largest = lengths.iter().copied().fold(0.0, f64::max);
-    let mean = squares / lengths.len().max(1) as f64;
-    add("displacement_rms", mean.sqrt());
-    add("displacement_largest", largest);
-    // A mesh that folds over itself is written all the same, and has no distance.
-    if let Ok((after, _)) = ClosedMesh::new(after.clone()) {
-        add("hausdorff_distance", hausdorff_distance(before, &after));
-        let relative = |after: f64, before: f64| 100.0 * (after / before - 1.0);
-        report["volume_change_percent"] = relative(after.volume(), before.volume()).into();
-        report["area_change_percent"] = relative(after.area(), before.area()).into();
+/// How a surface differs from the one that it was.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeshReport {
+    /// How far its vertices are from there, root of the mean square, in the units of the mesh,
+    pub displacement_rms: f64,
+    /// and in percent of the longest side.
+    pub displacement_rms_percent: f64,
+    /// The farthest of them,
+    pub displacement_largest: f64,
+    /// and in percent.
+    pub displacement_largest_percent: f64,
+    /// The largest distance of a place of either surface from the other,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_distance: Option<f64>,
+    /// and in percent; a mesh that folds over itself has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_distance_percent: Option<f64>,
+    /// By how much the volume has changed, in percent,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_change_percent: Option<f64>,
+    /// and the area.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub area_change_percent: Option<f64>,
+    /// Standard deviation of the noise that was taken off, in the units of the mesh; 0 where something else ended the flow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Where vertices followed the flow: the part that could not, in percent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_behind_percent: Option<f64>,
+}
+
+impl MeshReport {
+    /// Of a mesh whose vertices are that far from the surface `before`.
+    pub fn new(before: &ClosedMesh, after: &TriangleMesh, lengths: &[f64]) -> Self {
+        let percent = |length: f64| 100.0 * length / before.bounding_box().longest_side();
+        let squares: f64 = lengths.iter().map(|length| length * length).sum();
+        let largest = lengths.iter().copied().fold(0.0, f64::max);
+        let rms = (squares / lengths.len().max(1) as f64).sqrt();
+        let mut report = Self {
+            displacement_rms: rms,
+            displacement_rms_percent: percent(rms),
+            displacement_largest: largest,
+            displacement_largest_percent: percent(largest),
+            ..Self::default()
+        };
+        // A mesh that folds over itself is written all the same, and has no distance.
+        if let Ok((after, _)) = ClosedMesh::new(after.clone()) {
+            let far = hausdorff_distance(before, &after);
+            let relative = |after: f64, before: f64| Some(100.0 * (after / before - 1.0));
+            report.hausdorff_distance = Some(far);
+            report.hausdorff_distance_percent = Some(percent(far));
+            report.volume_change_percent = relative(after.volume(), before.volume());
+            report.area_change_percent = relative(after.area(), before.area());
+        }
+        report
     }
-    report
 }
 
 /// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which

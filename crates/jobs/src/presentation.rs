@@ -26,6 +26,7 @@ pub const SERIES: &str = "frames.pvd";
 pub const SUMMARY: &str = "summary.json";
 pub const PAGE: &str = "index.html";
 
+/// The parts and holes of a shape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Topology {
     /// Closed curves or surfaces.
@@ -35,6 +36,7 @@ pub struct Topology {
 }
 
 impl Topology {
+    /// Those of a surface.
     pub fn of(surface: &ClosedMesh) -> Self {
         Self {
             components: surface.components(),
@@ -91,8 +93,11 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     /// Refuses other files.
     fn check_saved(path: &Path) -> Result<()> {
         if !Self::SAVED.contains(&&*extension(path)) {
-            let (path, formats) = (path.display(), Self::SAVED.join(" or ."));
-            refuse!("--save {path}: a result in {D}D is saved as .{formats}");
+            return Err(Error::Format {
+                path: path.to_owned(),
+                dimension: D,
+                formats: Self::SAVED,
+            });
         }
         Ok(())
     }

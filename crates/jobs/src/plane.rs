@@ -3,7 +3,6 @@
 use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
-use crate::cli::MessageOptions;
 use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -48,12 +47,12 @@ impl Plane {
         let ([width, height], [w, h]) = (image.size(), self.frame.size());
         if self.image.is_some() && [width, height] != [w, h] {
             refuse!(
-                "--mask {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
+                "`mask` {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
             );
         }
         if self.image.is_none() && width != height {
             refuse!(
-                "--mask {mask} has {width} x {height} pixels; it must be a square, which fills the box"
+                "`mask` {mask} has {width} x {height} pixels; it must be a square, which fills the box"
             );
         }
         let side = Side::of(&image, 0.5)?;
@@ -66,17 +65,14 @@ impl Plane {
     }
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
-    pub fn repair(&mut self, mask: &dyn SignedDistance<2>, messages: MessageOptions) -> Result<()> {
+    pub fn repair(&mut self, mask: &dyn SignedDistance<2>, watcher: &dyn Watcher) -> Result<()> {
         let Some(path) = &self.image else {
             return Ok(());
         };
         let bytes = files::read(path)?;
         let picture = images::colours(path, &bytes)?;
         if images::is_deep(&bytes) {
-            messages.warn(&format!(
-                "{} has more than 8 bits for a tone; the repaired image has 8",
-                path.display()
-            ));
+            watcher.warning(&Warning::Deep { path: path.clone() });
         }
         let width = self.frame.size()[0] as usize;
         let is_inside = |pixel: usize| {
@@ -86,7 +82,7 @@ impl Plane {
         let drawn: Vec<bool> = (0..picture.pixels().len()).map(is_inside).collect();
         if !drawn.contains(&true) {
             refuse!(
-                "--mask contains no pixel of {}: nothing would be drawn",
+                "`mask` contains no pixel of {}: nothing would be drawn",
                 path.display()
             );
         }
@@ -157,10 +153,10 @@ impl Presentation<2> for Plane {
     }
 
     fn turn(&mut self, up: &mut Option<UpAxis>) -> Result<()> {
-        if let Some(axis) = up {
-            refuse!("--up {axis} has no meaning in the plane: leave it out");
+        match up {
+            Some(axis) => Err(Error::foreign("up", axis, "a shape in the plane")),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn picture(&self, _: &Stored<2>, u: &Stored<2>, eps: f64) -> Result<Picture> {

@@ -1,8 +1,8 @@
 use std::f64::consts::PI;
 
-use crate::cli::{FairOptions, MessageOptions};
 use crate::input::{Loaded, Source, closed};
 use crate::keep;
+use crate::options::FairOptions;
 use crate::own::OwnMesh;
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -21,39 +21,38 @@ const FLAT: f64 = 0.05;
 
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
-    pub fn takes_small_steps(&self) -> bool {
+    pub(crate) fn takes_small_steps(&self) -> bool {
         let ratio = self.energy_ratio.or(self.flow.energy);
         self.noise.is_some() || ratio.is_some() || !self.ends
     }
 
-    pub fn check(&mut self) -> Result<()> {
+    pub(crate) fn check(&mut self) -> Result<()> {
         let flow = &self.flow;
         self.ends = self.energy_ratio.is_some()
             || flow.run.time.is_some()
             || flow.energy.is_some()
             || flow.run.steps.is_some();
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
-            refuse!("--energy-ratio {ratio} is reached before the first step: give a part below 1");
+            refuse!("`energy_ratio` {ratio} is reached before the first step: give a part below 1");
         }
         if let Some(energy) = self.flow.energy.filter(|energy| *energy < BALL) {
             refuse!(
-                "--energy {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
-                 off the noise, or give --energy-ratio 0.5 for half the energy that there is"
+                "`energy` {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
+                 off the noise, or give `energy_ratio` 0.5 for half the energy that there is"
             );
         }
         Ok(())
     }
 
-    pub fn load(&mut self, device: DeviceKind, messages: MessageOptions) -> Result<Loaded> {
-        let mut reader = self.flow.run.reader(device, messages)?;
+    pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
+        let mut reader = self.flow.run.reader(device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         let loaded = match reader.source.clone() {
-            Source::Mesh(path) => return self.load_mesh(&path, device, messages),
+            Source::Mesh(path) => return self.load_mesh(&path, device, watcher),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
-                let given = self.noise.map_or("--keep", |_| "--noise");
-                refuse!(
-                    "{given} has no meaning for a volume, of which a new mesh is made: leave it out"
-                );
+                let given = self.noise.map_or("keep", |_| "noise");
+                let what = "a volume, of which a new mesh is made";
+                return Err(Error::foreign(given, "", what));
             }
             Source::Volume(_) => {
                 let mut loaded = reader.load()?;
@@ -72,8 +71,8 @@ impl FairOptions {
             }
             _ if self.noise.is_some() || self.keep.is_some() || !self.ends => {
                 refuse!(
-                    "only a mesh in a file has noise to take off: say how smooth the surface is to become, by --energy-ratio, --time, \
-                     --energy or --steps, without --noise and --keep",
+                    "only a mesh in a file has noise to take off: say how smooth the surface is to become, by `energy_ratio`, `time`, \
+                     `energy` or `steps`, without `noise` and `keep`",
                 );
             }
             _ => reader.load()?,
@@ -90,66 +89,61 @@ impl FairOptions {
         &mut self,
         path: &Path,
         device: DeviceKind,
-        messages: MessageOptions,
+        watcher: &dyn Watcher,
     ) -> Result<Loaded> {
         let repairs = self.flow.run.input.repair;
         if repairs && !self.remesh {
             refuse!(
-                "--repair makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give --remesh",
+                "`repair` makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give `remesh`",
             );
         }
         if let Some(mask) = self.keep.as_deref().and_then(keep::mask) {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = if repairs {
-            surfaces::encode(path, closed(path, true, messages)?.mesh())?
+            surfaces::encode(path, closed(path, true, watcher)?.mesh())?
         } else {
             files::read(path)?
         };
         let noise = self.noise.or(self.ends.then_some(0.0));
         let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
-        let (mut own, warnings) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
+        let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
         own.check_movable(path)?;
         own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
         own.drives_volume = to_target || self.flow.reduced_volume.is_some();
-        let but = if self.remesh {
-            ""
-        } else {
-            " for the flow, and not in what is written"
-        };
-        for warning in warnings {
-            messages.warn(&format!("{}: {warning}{but}", path.display()));
+        for change in changes {
+            watcher.warning(&Warning::Mended {
+                path: path.to_owned(),
+                change,
+                only_for_flow: !self.remesh,
+            });
         }
         if own.fairing().noise > 0.0 && own.drives_volume {
             refuse!(
-                "the volume stays where noise is taken off: leave out --volume and --reduced-volume, or --noise and say how smooth the surface is \
-                 to become, by --energy-ratio, --time, --energy or --steps"
+                "the volume stays where noise is taken off: leave out `volume` and `reduced_volume`, or `noise` and say how smooth the surface is \
+                 to become, by `energy_ratio`, `time`, `energy` or `steps`"
             );
         }
         if noise.is_none() {
             let noise = own.fairing().noise;
             if noise == 0.0 {
                 refuse!(
-                    "the mesh has no noise that could be estimated: give --noise LENGTH, or say how smooth the surface is to become, by \
-                     --energy-ratio, --time, --energy or --steps"
+                    "the mesh has no noise that could be estimated: give `noise` LENGTH, or say how smooth the surface is to become, by \
+                     `energy_ratio`, `time`, `energy` or `steps`"
                 );
             }
-            messages.note(&format!(
-                "noise: {noise:.3e}, {:.3} % of the longest side, estimated (--noise)",
-                100.0 * noise / own.rough().bounding_box().longest_side()
-            ));
+            watcher.note(&Note::Noise {
+                noise,
+                longest_side: own.rough().bounding_box().longest_side(),
+            });
             let flat = own.rough().mesh().flat_part(noise);
             if flat > FLAT {
-                messages.warn(&format!(
-                    "{:.0} % of the vertices lie in a plane with those around them, where noise leaves none: what was taken for noise may be the \
-                     edges of the mesh, which become round; --noise LENGTH says how much noise there is",
-                    100.0 * flat
-                ));
+                watcher.warning(&Warning::Flat { part: flat });
             }
             self.noise = Some(noise);
         }
-        let mut reader = self.flow.run.reader(device, messages)?;
+        let mut reader = self.flow.run.reader(device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         reader.own(own, path)
     }

@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use engine::DISPLACEMENT;
-use surfaces::{Followed, Warning};
+use surfaces::Followed;
 
-use crate::faired::{Faired, figure, report, surface};
+use crate::faired::{Faired, MeshReport, figure, surface};
 use crate::keep;
 use crate::paths::extension;
 use crate::prelude::*;
@@ -53,7 +53,7 @@ impl OwnMesh {
         bytes: Vec<u8>,
         noise: Option<f64>,
         keep: Option<String>,
-    ) -> Result<(Self, Vec<Warning>)> {
+    ) -> Result<(Self, Vec<surfaces::Warning>)> {
         let mut own = Self {
             file: format!("{INPUT}.{}", extension(path)),
             noise: noise.unwrap_or(f64::NAN),
@@ -81,7 +81,12 @@ impl OwnMesh {
     }
 
     /// Takes the bytes of a file; noise that is not a number is estimated.
-    fn load(&mut self, bytes: Vec<u8>, path: &Path, mask: Option<Vec<u8>>) -> Result<Vec<Warning>> {
+    fn load(
+        &mut self,
+        bytes: Vec<u8>,
+        path: &Path,
+        mask: Option<Vec<u8>>,
+    ) -> Result<Vec<surfaces::Warning>> {
         let mesh = surfaces::decode(&bytes, path)?;
         let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
         if self.noise.is_nan() {
@@ -94,12 +99,12 @@ impl OwnMesh {
         let fairing = Fairing::new(closed, self.noise, stays);
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
-            refuse!("--keep contains all of the mesh: nothing could move");
+            refuse!("`keep` contains all of the mesh: nothing could move");
         }
         if keep.is_some() && kept == 0 {
             let bounds = fairing.rough.bounding_box();
             refuse!(
-                "--keep contains no vertex of the mesh, which goes from {:?} to {:?}",
+                "`keep` contains no vertex of the mesh, which goes from {:?} to {:?}",
                 bounds.lower,
                 bounds.upper
             );
@@ -140,7 +145,7 @@ impl OwnMesh {
         match surfaces::rewrite(bytes, path, mesh) {
             Err(surfaces::Error::Format { problem, .. }) => refuse!(
                 "the vertices of {} cannot be moved: {problem}; write it anew by `willmore sample --save`, which can then be faired, or give \
-                 --remesh",
+                 `remesh`",
                 path.display()
             ),
             Err(other) => Err(Error::mesh(other)),
@@ -204,7 +209,7 @@ impl OwnMesh {
                 mesh = mesh.with_volume(rough.volume(), moves);
             }
             let mut made = Faired::anew(rough, mesh, up)?;
-            made.report["noise"] = self.noise.into();
+            made.report.noise = Some(self.noise);
             return Ok(made);
         }
         let fairing = self.fairing();
@@ -232,9 +237,11 @@ impl OwnMesh {
             normals: None,
         };
         let lost = fairing.unresolved(&followed, thinnest(start.grid()));
-        let mut report = report(rough, &moved, &lengths);
-        report["noise"] = self.noise.into();
-        report["left_behind_percent"] = (100.0 * followed.left_behind(u)?).into();
+        let report = MeshReport {
+            noise: Some(self.noise),
+            left_behind_percent: Some(100.0 * followed.left_behind(u)?),
+            ..MeshReport::new(rough, &moved, &lengths)
+        };
         Ok(Faired {
             file: Some((
                 self.extension().to_owned(),

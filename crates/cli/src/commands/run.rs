@@ -1,0 +1,56 @@
+//! The commands that make runs.
+
+use jobs::Outcome;
+
+use super::labels;
+use crate::console::Console;
+use crate::error::{Error, Result};
+
+/// Makes a run, or one for each label of a volume.
+pub fn run(mut job: jobs::Command, console: &Console) -> Result<()> {
+    let input = job.options().input.clone();
+    let of_label = |label| {
+        let mut one = job.clone();
+        let options = one.options();
+        labels::choose(&mut options.input, label);
+        for path in options.output.iter_mut().chain(&mut options.save) {
+            labels::named(path, label);
+        }
+        run(one, console)
+    };
+    if labels::with_each(&input, console, of_label)? {
+        return Ok(());
+    }
+    tell(&jobs::start(job, console)?, console)
+}
+
+/// Prints what came out of a run.
+pub fn tell(outcome: &Outcome, console: &Console) -> Result<()> {
+    let reason = match &outcome.ended {
+        None | Some(engine::Stop::Steps(_)) => String::new(),
+        Some(stop) => format!(": {stop}"),
+    };
+    let progress = jobs::progress(outcome.steps, outcome.time);
+    let mut text = vec![format!("{progress} in {:.1} s{reason}", outcome.seconds)];
+    if let Some(summary) = &outcome.summary {
+        text.extend(summary.sentences());
+    }
+    let shown = outcome.folder.display();
+    text.push(match (&outcome.summary, &outcome.page) {
+        (None, _) => {
+            // What was there already is to be written over by whoever goes on, too.
+            let saved = outcome.save.as_deref().is_some_and(std::path::Path::exists);
+            let force = if saved { " --force" } else { "" };
+            format!("interrupted, go on with: willmore resume {shown}{force}")
+        }
+        (Some(_), None) => format!("results are in {shown}"),
+        (Some(_), Some(page)) => {
+            format!("results are in {shown}, to look at: {}", page.display())
+        }
+    });
+    console.report(&outcome.to_json(), &text.join("\n"))?;
+    match outcome.summary {
+        Some(_) => Ok(()),
+        None => Err(Error::Interrupted),
+    }
+}

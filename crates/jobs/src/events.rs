@@ -1,0 +1,382 @@
+//! What a job tells while it runs, as values: whoever starts it decides how to show them.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use runs::Interrupt;
+
+use crate::presentation::Topology;
+
+/// What looks after a job. By default nothing is told, and nothing interrupts it.
+pub trait Watcher {
+    /// Something that the person should know before trusting the result.
+    fn warning(&self, _: &Warning) {}
+
+    /// A choice that the job made, or how far it is.
+    fn note(&self, _: &Note) {}
+
+    /// Long work begins, of so many parts.
+    fn begins(&self, _title: &str, _parts: u64) -> Box<dyn Progress> {
+        Box::new(Untold)
+    }
+
+    /// The flag that ends the steps of a flow after the current one; asked for before the first step.
+    ///
+    /// # Errors
+    /// [`runs::Error::Signals`] where signals cannot be caught.
+    fn interrupt(&self) -> Result<Interrupt, runs::Error> {
+        Ok(Interrupt::never())
+    }
+}
+
+/// A watcher that tells nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Watcher for Silent {}
+
+/// How far long work is; it is over when this is dropped.
+pub trait Progress: Sync {
+    /// So many parts are done.
+    fn reach(&self, parts: u64);
+    /// One more is.
+    fn advance(&self);
+}
+
+struct Untold;
+
+impl Progress for Untold {
+    fn reach(&self, _: u64) {}
+    fn advance(&self) {}
+}
+
+/// What a person should know before trusting a result.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The file of a mesh was mended while it was read.
+    Mended {
+        /// The file.
+        path: PathBuf,
+        /// How.
+        change: surfaces::Warning,
+        /// Whether the mesh that is written does not have the change, since its vertices follow the flow and all else of the file stays.
+        only_for_flow: bool,
+    },
+    /// A new mesh was made of one that is open, crosses itself or is not oriented alike.
+    Repaired {
+        /// The file.
+        path: PathBuf,
+        /// What was done.
+        changes: surfaces::RepairChanges,
+    },
+    /// Parts or holes are lost on the grid.
+    Lost(Loss),
+    /// A part of the boundary is at parts or gaps that are thin for the interface.
+    Thin(ThinParts),
+    /// Nodes that the faces of a mesh that crosses itself put on the wrong side were put right.
+    SignsMended {
+        /// How many.
+        nodes: usize,
+    },
+    /// Small parts or holes of a segmentation are left out.
+    Specks {
+        /// How many.
+        count: usize,
+        /// How many voxels are inside now that were not before.
+        filled: isize,
+    },
+    /// The estimated noise of a mesh may be its edges.
+    Flat {
+        /// The part of the vertices that lie in a plane with those around them.
+        part: f64,
+    },
+    /// An image has more than eight bits for a tone, and its repair has eight.
+    Deep {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The folder of the file to save is gone.
+    FolderGone {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no shape left to save.
+    NothingSaved,
+}
+
+/// Parts or gaps that a grid does not hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loss {
+    /// Cells per unit length.
+    pub cells: usize,
+    /// Thinner parts and gaps come and go with the place of the grid.
+    pub thinnest: f64,
+    /// The longest side of the mesh.
+    pub longest_side: f64,
+    /// Parts and holes of the mesh,
+    pub of_mesh: Topology,
+    /// and of its surface on the grid.
+    pub on_grid: Topology,
+    /// How far that is from the mesh.
+    pub distance: GridDistance,
+}
+
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "with {} cells per unit length (`cells`) parts and gaps thinner than {:.3e} ({:.2} % of the longest side) are lost: the mesh has {}, the \
+             grid {}; its surface is {}",
+            self.cells,
+            self.thinnest,
+            100.0 * self.thinnest / self.longest_side,
+            self.of_mesh,
+            self.on_grid,
+            self.distance,
+        )
+    }
+}
+
+/// How far the surface on a grid is from the mesh that it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GridDistance {
+    /// The Hausdorff distance.
+    AtMost {
+        /// In the units of the mesh.
+        length: f64,
+        /// The longest side of the mesh.
+        longest_side: f64,
+    },
+    /// The surface touches itself, so that there is no distance.
+    TouchesItself,
+    /// There is no surface.
+    Nothing,
+}
+
+impl fmt::Display for GridDistance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AtMost {
+                length,
+                longest_side,
+            } => {
+                let percent = 100.0 * length / longest_side;
+                write!(
+                    f,
+                    "at most {length:.3e} ({percent:.3} % of the longest side) from that of the mesh"
+                )
+            }
+            Self::TouchesItself => f.write_str("one that touches itself"),
+            Self::Nothing => f.write_str("not there at all"),
+        }
+    }
+}
+
+/// Parts or gaps that are thin for the interface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThinParts {
+    /// The part of the boundary at them.
+    pub part: f64,
+    /// They are thinner than this,
+    pub below: f64,
+    /// which is so many interface widths
+    pub widths: f64,
+    /// with so many cells per unit length.
+    pub cells: usize,
+    /// Whether vertices follow the surface, which they do less well there; otherwise thin parts do not last.
+    pub vertices_follow: bool,
+}
+
+impl fmt::Display for ThinParts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let consequence = if self.vertices_follow {
+            "where vertices follow less well"
+        } else {
+            "which will not last"
+        };
+        write!(
+            f,
+            "{:.1} % of the boundary is at parts or gaps thinner than {:.3e}, {} interface widths with {} cells per unit length (`cells`), {consequence}",
+            100.0 * self.part,
+            self.below,
+            self.widths,
+            self.cells,
+        )
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mended {
+                path,
+                change,
+                only_for_flow,
+            } => {
+                let only = if *only_for_flow {
+                    " for the flow, and not in the mesh that is written"
+                } else {
+                    ""
+                };
+                write!(f, "{}: {change}{only}", path.display())
+            }
+            Self::Repaired { path, changes } => write!(f, "{}: {changes}", path.display()),
+            Self::Lost(loss) => loss.fmt(f),
+            Self::Thin(thin) => thin.fmt(f),
+            Self::SignsMended { nodes } => write!(
+                f,
+                "the mesh crosses itself: {nodes} nodes of the grid, which its faces put on the wrong side, were put right"
+            ),
+            Self::Specks { count, filled } => write!(
+                f,
+                "{count} parts or holes of a few voxels are left out, which changes the volume by {filled:+} voxels"
+            ),
+            Self::Flat { part } => write!(
+                f,
+                "{:.0} % of the vertices lie in a plane with those around them, where noise leaves none: what was taken for noise may be the \
+                 edges of the mesh, which become round; `noise` says how much noise there is",
+                100.0 * part
+            ),
+            Self::Deep { path } => write!(
+                f,
+                "{} has more than 8 bits for a tone; the repaired image has 8",
+                path.display()
+            ),
+            Self::FolderGone { path } => {
+                write!(
+                    f,
+                    "nothing will be saved to {}: its folder is gone",
+                    path.display()
+                )
+            }
+            Self::NothingSaved => {
+                f.write_str("nothing is saved to the file of `save`: the shape has vanished")
+            }
+        }
+    }
+}
+
+/// A choice that a job made, or how far it is.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// The noise that was estimated.
+    Noise {
+        /// Standard deviation along the normals.
+        noise: f64,
+        /// The longest side of the mesh.
+        longest_side: f64,
+    },
+    /// The grid that was chosen for a mesh whose vertices follow the flow.
+    Grid {
+        /// Cells per unit length.
+        cells: usize,
+        /// The side of a cell.
+        spacing: f64,
+        /// How far the surface there is from the mesh.
+        distance: GridDistance,
+    },
+    /// Cells are wider than the voxels.
+    CoarserThanVoxels {
+        /// How many voxels wide.
+        voxels: f64,
+        /// Cells per unit length.
+        cells: usize,
+    },
+    /// Edges sharper than the interface became round.
+    RoundEdges {
+        /// Whether it is a curve, whose length it is about, and not a surface with an area.
+        is_curve: bool,
+        /// The length or area after
+        round: f64,
+        /// and before,
+        sharp: f64,
+        /// and to which it goes.
+        target: f64,
+    },
+    /// In the plane the area is that of the inside. Before version 0.1 the option held the length.
+    AreaInThePlane,
+    /// How much of the grid is stored.
+    Storage {
+        /// The part of the grid.
+        part: f64,
+        /// Bytes of memory, about.
+        bytes: f64,
+    },
+    /// Parts or holes have come or gone.
+    TopologyChanged {
+        /// The step after which.
+        step: usize,
+        /// Its time.
+        time: f64,
+        /// What there was
+        before: Topology,
+        /// and is now.
+        now: Topology,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Noise {
+                noise,
+                longest_side,
+            } => write!(
+                f,
+                "noise: {noise:.3e}, {:.3} % of the longest side, estimated (`noise`)",
+                100.0 * noise / longest_side
+            ),
+            Self::Grid {
+                cells,
+                spacing,
+                distance,
+            } => write!(
+                f,
+                "grid: {cells} cells per unit length, {spacing:.3e} wide (`cells`); its surface is {distance}"
+            ),
+            Self::CoarserThanVoxels { voxels, cells } => write!(
+                f,
+                "a cell is {voxels:.1} voxels wide: with more `cells` than {cells} smaller details last"
+            ),
+            Self::RoundEdges {
+                is_curve,
+                round,
+                sharp,
+                target,
+            } => {
+                let size = if *is_curve { "length" } else { "area" };
+                write!(
+                    f,
+                    "edges sharper than the interface became round: {size} {round:.4} instead of {sharp:.4}; it goes to {target:.4} over the steps of \
+                     `ramp`"
+                )
+            }
+            Self::AreaInThePlane => f.write_str(
+                "`area` holds the area of the inside; `length` holds the length of the curve",
+            ),
+            Self::Storage { part, bytes } => {
+                let what = if *part < 1.0 {
+                    format!("bricks near the surface, {:.0} % of the grid", 100.0 * part)
+                } else {
+                    "the whole grid".to_owned()
+                };
+                let gigabytes = 1e-9 * bytes;
+                write!(
+                    f,
+                    "storage: {what}, about {gigabytes:.1} GB of memory (`storage`)"
+                )
+            }
+            Self::TopologyChanged {
+                step,
+                time,
+                before,
+                now,
+            } => write!(
+                f,
+                "step {step}, t = {time:.4e}: parts or holes have come or gone, {now} where there were {before}"
+            ),
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! The options of jobs. Programs can read them with clap; what is left open has a default that depends on the input.
+
+use clap::{Args, ValueEnum};
+use engine::Storage;
+
+use crate::paths::MESHES;
+use crate::prelude::*;
+use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
+
+const INPUT: &str = "Input";
+const GRID: &str = "Shape and grid";
+const FLOW: &str = "Flow";
+const SIZES: &str = "Sizes and energy";
+const OUTPUT: &str = "Output";
+const RUN: &str = "Run";
+const ADVANCED: &str = "Advanced";
+
+/// Where the shape comes from and how large it is.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "kebab-case")]
+pub struct InputOptions {
+    /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
+    ///
+    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume of voxels (.nii, .nii.gz, .mrc, .map, and .tif
+    /// of several pages), a field (.npy), builtin:NAME with NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure,
+    /// lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z, or - for standard input
+    pub input: Option<String>,
+
+    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; those of a field; for a mesh, image or volume the coarsest of a few that
+    /// holds its thin parts]
+    #[arg(long, value_name = "N", help_heading = GRID)]
+    pub cells: Option<usize>,
+
+    /// Side of the periodic box [default: 2 in 2D, 1 in 3D]
+    #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
+    pub box_side: Option<f64>,
+
+    /// Longest side of the shape in units of --box-side; the box is scaled to meshes, images and volumes, so that all other lengths are in
+    /// the units of the input [default: 0.6 of the box, for `fair` of a mesh 0.8 or 0.9]
+    #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
+    pub side_length: Option<f64>,
+
+    /// Which pixels of an image are inside [default: auto]
+    #[arg(long, value_name = "SIDE", value_enum, help_heading = INPUT, hide_short_help = true)]
+    pub inside: Option<Inside>,
+
+    /// Value between inside and outside: of an image its grey value from 0 to 1, or opacity [default: 0.5]; of a volume in its units
+    #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
+    pub threshold: Option<f64>,
+
+    /// The label of a volume that is inside, or all: each but 0 becomes a surface of its own [default: the larger of two values]
+    #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
+    pub label: Option<Label>,
+
+    /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and the changes are reported
+    #[arg(long, help_heading = INPUT, hide_short_help = true)]
+    pub repair: bool,
+
+    /// The kind of the values of a field [default: phase-field]
+    #[arg(long, alias = "holds", value_name = "KIND", value_enum, help_heading = INPUT, hide_short_help = true)]
+    pub field_kind: Option<FieldKind>,
+}
+
+/// Which pixels of an image are inside.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inside {
+    /// Opaque ones, or those unlike the border
+    Auto,
+    /// Dark ones
+    Dark,
+    /// Light ones
+    Light,
+}
+
+/// The kind of the values of a field.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum FieldKind {
+    /// 1 inside, -1 outside
+    PhaseField,
+    /// Signed distances, negative inside
+    Distance,
+}
+
+/// Which operator, at which scales.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "kebab-case")]
+pub struct OperatorOptions {
+    /// Interface width in cells [default: 2, or that of --network]
+    #[arg(long, value_name = "RATIO", help_heading = ADVANCED, hide_short_help = true)]
+    pub eps_over_h: Option<f64>,
+
+    /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
+    #[arg(
+        long = "scheme",
+        value_name = "NAME",
+        value_enum,
+        default_value = "accurate",
+        help_heading = ADVANCED,
+        hide_short_help = true
+    )]
+    #[serde(rename = "scheme")]
+    pub formulation: Formulation,
+
+    /// Use this network, as `willmore train` makes them
+    #[arg(long, value_name = "FILE", help_heading = ADVANCED, hide_short_help = true)]
+    pub network: Option<PathBuf>,
+
+    /// Which part of the phase field is stored: dense, the whole grid; bricks, cells near the surface; auto, bricks where they are less than half of
+    /// the grid; mean curvature flow, finite elements and the paper's networks always take the whole grid [default: auto]
+    #[arg(
+        long,
+        value_name = "PART",
+        value_enum,
+        hide_possible_values = true,
+        help_heading = ADVANCED,
+        hide_short_help = true
+    )]
+    pub storage: Option<Storage>,
+}
+
+/// What is there stays, unless this is given.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct ForceOption {
+    /// Write over what is there: a file, or the run in a folder
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
+    pub force: bool,
+}
+
+/// Where computations run.
+#[derive(Args, Serialize, Clone, Debug)]
+pub struct CommonOptions {
+    /// Where to compute: flex or ndarray (CPU), wgpu or cuda (GPU), if compiled in [default: the first compiled in]
+    #[arg(long, value_name = "NAME", help_heading = RUN, hide_short_help = true)]
+    pub device: Option<String>,
+
+    /// Seed of the random numbers of check and train; flows have none
+    #[arg(long, default_value_t = 1, help_heading = RUN, hide_short_help = true)]
+    pub seed: u64,
+}
+
+impl Default for CommonOptions {
+    fn default() -> Self {
+        Self {
+            device: None,
+            seed: 1,
+        }
+    }
+}
+
+/// Options of every job that makes a run.
+#[derive(Args, Serialize, Clone, Debug)]
+#[serde(rename_all = "kebab-case")]
+pub struct RunOptions {
+    /// The input.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub operator: OperatorOptions,
+
+    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
+    #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
+    pub steps: Option<usize>,
+
+    /// Stop at this time, a length to the fourth power in the units of the input
+    #[arg(long, value_name = "T", value_parser = positive, help_heading = FLOW)]
+    pub time: Option<f64>,
+
+    /// Keep a picture, the field and the shape every so many steps, and an animation
+    #[arg(long, value_name = "EVERY", value_parser = count, help_heading = OUTPUT)]
+    pub frames: Option<usize>,
+
+    /// Steps between two checkpoints
+    #[arg(
+        long,
+        value_name = "STEPS",
+        value_parser = count,
+        default_value_t = 5,
+        help_heading = RUN,
+        hide_short_help = true
+    )]
+    pub checkpoint_every: usize,
+
+    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS", help_heading = OUTPUT, hide_short_help = true)]
+    pub up: Option<UpAxis>,
+
+    /// Leave out index.html, the page of the run for a browser
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
+    pub no_page: bool,
+
+    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
+    #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
+    #[serde(skip)]
+    pub output: Option<PathBuf>,
+
+    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    pub save: Option<PathBuf>,
+
+    /// Whether the file to save is for this time alone: a run that is resumed does not write it again.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub saves_once: bool,
+
+    /// Whether files and runs are written over.
+    #[command(flatten)]
+    #[serde(skip)]
+    pub force: ForceOption,
+    /// Device and seed.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        Self {
+            input: InputOptions::default(),
+            operator: OperatorOptions::default(),
+            steps: None,
+            time: None,
+            frames: None,
+            checkpoint_every: 5,
+            up: None,
+            no_page: false,
+            output: None,
+            save: None,
+            saves_once: false,
+            force: ForceOption::default(),
+            common: CommonOptions::default(),
+        }
+    }
+}
+
+/// Options of Willmore flow.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "kebab-case")]
+pub struct FlowOptions {
+    /// Time steps, in lengths of the input to the fourth power: controlled (of second order, by their error), auto (by the energy),
+    /// auto:FIRST, VALUE, doubling:FIRST, graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or
+    /// ramp:VALUE,HALVINGS, whose first step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled where only --steps
+    /// or --time end it]
+    #[arg(long, value_name = "TAU", help_heading = FLOW, hide_short_help = true)]
+    pub tau: Option<StepRule>,
+
+    /// About what estimated time error controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
+    /// part of how far the surface moves in it in percent [default: 1.5%]
+    #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true, help_heading = FLOW, hide_short_help = true)]
+    pub tolerance: Option<Amount>,
+
+    /// Hold the volume of a shape in space: keep, a VALUE in the units of the input, or PERCENT of the volume at the beginning, as 90%;
+    /// for a segmentation that is the volume of its voxels without specks [default: keep for `fair` of a segmentation]
+    #[arg(long, value_name = "TARGET", help_heading = SIZES)]
+    pub volume: Option<SizeTarget>,
+
+    /// Hold the length of a curve in the plane: keep, a VALUE, or PERCENT, as 105%. With `flow`, edges sharper than the interface become
+    /// round first, and the length comes back over the ramp
+    #[arg(long, value_name = "TARGET", help_heading = SIZES, hide_short_help = true)]
+    pub length: Option<SizeTarget>,
+
+    /// Hold the area: of the surface in space, of the inside in the plane; keep, a VALUE, or PERCENT, as 105%. With `flow` in space, edges
+    /// sharper than the interface become round first, and the area comes back over the ramp
+    #[arg(long, value_name = "TARGET", help_heading = SIZES)]
+    pub area: Option<SizeTarget>,
+
+    /// Keep the area of the surface and drive the volume to this reduced volume, above 0 and below 1: 6 sqrt(pi) V / A^(3/2); in the plane
+    /// keep the length and drive the area to 4 pi A / L^2; a ball has 1, a red blood cell 0.64
+    #[arg(long, value_name = "PART", conflicts_with_all = ["volume", "area", "length"], help_heading = SIZES, hide_short_help = true)]
+    pub reduced_volume: Option<f64>,
+
+    /// Steps over which sizes go to their targets [default: 20]
+    #[arg(long, value_name = "STEPS", help_heading = SIZES, hide_short_help = true)]
+    pub ramp: Option<usize>,
+
+    /// Spontaneous curvature c0, one over a length: the energy is 1/2 int (kappa - c0)^2 dA, with the sum kappa of the principal curvatures,
+    /// which is positive for a ball [default: 0]
+    #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
+    pub spontaneous_curvature: Option<f64>,
+
+    /// Surface tension: add this times the area of the surface, in the plane the length of the curve, to the energy; one over a length squared
+    /// [default: 0]
+    #[arg(long, value_name = "SIGMA", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
+    pub tension: Option<f64>,
+
+    /// Pressure: add this times the volume, in the plane the area of the inside, to the energy; one over a length cubed [default: 0]
+    #[arg(long, value_name = "P", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
+    pub pressure: Option<f64>,
+
+    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
+    #[arg(long, value_name = "W", value_parser = positive, help_heading = FLOW, hide_short_help = true)]
+    pub energy: Option<f64>,
+
+    /// The options that all jobs have.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub run: RunOptions,
+}
+
+/// Options of fairing.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+#[serde(rename_all = "kebab-case")]
+pub struct FairOptions {
+    /// Those of the flow.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub flow: FlowOptions,
+
+    /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
+    /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (1.6 voxels)^4, or until it has gone by .35 of a voxel]
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
+    pub noise: Option<f64>,
+
+    /// Stop as soon as the Willmore energy is no more than this part of that at the beginning; `--volume keep` keeps the volume
+    #[arg(long, value_name = "PART", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
+    pub energy_ratio: Option<f64>,
+
+    /// Leave this where it is: everything in box:x0,y0,z0,x1,y1,z1, in ball:x,y,z,r or inside a closed mesh (.obj, .stl, .ply), in the
+    /// coordinates of the input, or its vertices of a colour, as colour:ff0000
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = FLOW)]
+    pub keep: Option<String>,
+
+    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved; with --repair the input need not be
+    /// closed. A segmentation always gives a new mesh
+    #[arg(long, help_heading = OUTPUT)]
+    pub remesh: bool,
+
+    /// Go on even if the grid is too coarse for thin parts of the input
+    #[arg(long, help_heading = GRID, hide_short_help = true)]
+    pub allow_loss: bool,
+
+    /// Format of the mesh in the run's folder [default: that of the input]
+    #[arg(long, value_name = "NAME", value_parser = MESHES, help_heading = OUTPUT, hide_short_help = true)]
+    pub format: Option<String>,
+
+    /// Whether an option other than --noise says when to stop.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub ends: bool,
+}
+
+/// Options of inpainting.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+pub struct InpaintOptions {
+    /// Those of the flow.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub flow: FlowOptions,
+
+    /// The region that is filled: an image of the size of the input, or a square for the box of another input (its opaque pixels if some
+    /// are not, else the dark ones, or the light ones if most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D
+    /// box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = INPUT)]
+    pub mask: Option<String>,
+
+    /// What the region holds at the beginning: keep, empty, full, or a region as box:... or ball:...
+    #[arg(long, value_name = "SHAPE", default_value = "keep", help_heading = FLOW)]
+    pub ansatz: Ansatz,
+}
+
+/// Options of mean curvature flow.
+#[derive(Args, Serialize, Clone, Debug)]
+pub struct McfOptions {
+    /// The step of mean curvature flow
+    #[arg(long, value_name = "NAME", value_enum, default_value = "network", help_heading = FLOW)]
+    pub method: Method,
+
+    /// The options that all jobs have.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub run: RunOptions,
+}
+
+/// Options of writing an input to a file.
+#[derive(Args, Clone, Debug)]
+pub struct SampleOptions {
+    /// The input.
+    #[command(flatten)]
+    pub input: InputOptions,
+
+    /// The file to write: a picture (.png, of a plane shape .svg), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
+    #[arg(long, value_name = "FILE")]
+    pub save: PathBuf,
+
+    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z; may be given again
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    pub without: Vec<Region>,
+
+    /// Move the vertices of a mesh along their normals by random lengths of up to this
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0)]
+    pub noise: f64,
+
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    /// Write the zero level set on the grid in place of a mesh that is converted as it is, as with --cells and --without
+    #[arg(long)]
+    pub resample: bool,
+
+    /// Axis that points up in a picture: x, y or z [default: y for .obj, otherwise z]
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
+
+    /// Whether files are written over.
+    #[command(flatten)]
+    pub force: ForceOption,
+}

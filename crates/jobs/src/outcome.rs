@@ -1,0 +1,256 @@
+//! What came out of a job.
+
+use std::collections::BTreeMap;
+
+use engine::Helfrich;
+use pages::five_digits;
+
+use crate::faired::MeshReport;
+use crate::prelude::*;
+
+/// Measures whose change is told.
+pub(crate) const SIZES: [&str; 3] = ["length", "area", "volume"];
+
+/// The energy of a surface over that of a sphere is not below this but for errors of the grid.
+const NO_SURFACE: f64 = 0.95;
+/// More than this part of the vertices, in percent, that could not follow is told.
+const LEFT_BEHIND: f64 = 1.0;
+
+/// What came out of a job that makes a run.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The name of the job.
+    pub command: &'static str,
+    /// The folder of the run.
+    pub folder: PathBuf,
+    /// How many steps there are,
+    pub steps: usize,
+    /// and the time that they reach.
+    pub time: f64,
+    /// The rule that ended the run; none if it was interrupted.
+    pub ended: Option<Stop>,
+    /// What is known of a run that is over.
+    pub summary: Option<Summary>,
+    /// The page of the run, if there is one.
+    pub page: Option<PathBuf>,
+    /// The file to which the result goes besides, if one was chosen.
+    pub save: Option<PathBuf>,
+    /// How long this took.
+    pub seconds: f64,
+}
+
+impl Outcome {
+    /// As a JSON object.
+    pub fn to_json(&self) -> Value {
+        let mut outcome = match &self.summary {
+            Some(summary) => summary.to_json(),
+            None => {
+                json!({ "command": self.command, "finished": false, "steps": self.steps, "time": self.time })
+            }
+        };
+        if let Some(stop) = &self.ended {
+            outcome["ended"] = stop.to_string().into();
+        }
+        outcome["run"] = self.folder.to_string_lossy().into();
+        outcome["seconds"] = self.seconds.into();
+        outcome
+    }
+}
+
+/// What is known of a run that is over: `summary.json`. Lengths are in the units of the input.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Summary {
+    /// The name of the job.
+    pub command: String,
+    /// True.
+    pub finished: bool,
+    /// How many steps there are,
+    pub steps: usize,
+    /// and the time that they reach.
+    pub time: f64,
+    /// What controlled steps say of themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_steps: Option<TimeAccuracy>,
+    /// Steps that were made shorter than their rule wanted them.
+    pub shortened_steps: usize,
+    /// The energy at the beginning,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_energy: Option<f64>,
+    /// and at the end; mean curvature flow has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<f64>,
+    /// Spontaneous curvature, tension and pressure, if the energy is not the Willmore energy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_terms: Option<Helfrich>,
+    /// The Willmore energy of a surface over that of a sphere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_over_8_pi: Option<f64>,
+    /// Whether the energy is as low as was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_reached: Option<bool>,
+    /// Closed curves or surfaces.
+    pub components: usize,
+    /// Of all surfaces together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub euler_characteristic: Option<i64>,
+    /// Whether there are as many parts and holes as before.
+    pub same_topology: bool,
+    /// Whether the shape touches the side of the box.
+    pub touches_box: bool,
+    /// How a surface has moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshReport>,
+    /// The grid.
+    pub grid: GridSummary,
+    /// Sizes and other measures at the end, and by how much in percent the sizes have changed.
+    #[serde(flatten)]
+    pub measures: BTreeMap<String, Option<f64>>,
+}
+
+/// What controlled steps say of themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimeAccuracy {
+    /// How far the interface is from where exact steps would have taken it, if the steps say enough.
+    pub estimated_error: Option<f64>,
+    /// The way of the place that moves farthest in each step.
+    pub path: f64,
+    /// The longest displacement in a stage of a step, in interface widths.
+    pub longest_displacement_in_widths: f64,
+}
+
+/// The grid of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridSummary {
+    /// Cells along each side.
+    pub cells: usize,
+    /// The side of a cell.
+    pub spacing: f64,
+    /// The lower corner of the box.
+    pub origin: Vec<f64>,
+    /// `eps`
+    pub interface_width: f64,
+    /// Cells whose values are stored at the end.
+    pub stored_cells: usize,
+}
+
+/// How far a run has come.
+pub fn progress(steps: usize, time: f64) -> String {
+    let plural = if steps == 1 { "" } else { "s" };
+    format!("{steps} step{plural} to t = {time:.4e}")
+}
+
+impl Summary {
+    /// As a JSON object.
+    pub fn to_json(&self) -> Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// A size or another measure at the end, or by how much in percent a size has changed.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        self.measures.get(name).copied().flatten()
+    }
+
+    /// Energy, sizes, and how far the surface has moved, each in a sentence, and then what may have gone wrong.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut text = Vec::new();
+        text.extend(self.of_energy());
+        text.extend(self.of_time());
+        text.extend(self.of_sizes());
+        text.extend(self.mesh.as_ref().map(of_mesh));
+        text.extend(self.doubts().into_iter().map(str::to_owned));
+        text
+    }
+
+    fn of_energy(&self) -> Option<String> {
+        let spheres = self.energy_over_8_pi;
+        let spheres = spheres.map_or(String::new(), |w| format!(" = {w:.4} x 8 pi"));
+        let name = match self.energy_terms {
+            None => "Willmore energy",
+            Some(_) => "energy",
+        };
+        let [energy, first] = [self.energy?, self.first_energy?].map(five_digits);
+        Some(format!("{name} {energy}{spheres}, before {first}"))
+    }
+
+    fn of_time(&self) -> Option<String> {
+        let accuracy = self.time_steps?;
+        let (error, path) = (accuracy.estimated_error?, accuracy.path);
+        Some(format!(
+            "time error about {error:.1e} (estimated), after a way of {path:.3}"
+        ))
+    }
+
+    fn of_sizes(&self) -> Option<String> {
+        let sizes = SIZES.iter().filter_map(|name| {
+            let change = match self.measure(&format!("{name}_change_percent")) {
+                Some(percent) if self.mesh.is_none() => format!(" ({percent:+.2} %)"),
+                _ => String::new(),
+            };
+            Some(format!(
+                "{name} {}{change}",
+                five_digits(self.measure(name)?)
+            ))
+        });
+        sizes.reduce(|all, next| format!("{all}, {next}"))
+    }
+
+    /// What may have gone wrong.
+    fn doubts(&self) -> Vec<&'static str> {
+        let left_behind = self.mesh.as_ref().and_then(|mesh| mesh.left_behind_percent);
+        let is_new = left_behind.is_none();
+        let notes = [
+            (
+                left_behind.is_some_and(|percent| percent > LEFT_BEHIND),
+                "vertices could not follow the surface, which has gone further than 4 interface widths: use `remesh` for a new mesh",
+            ),
+            (
+                self.energy_reached == Some(false),
+                "the energy asked for was not reached: `willmore resume` goes on with more `steps`",
+            ),
+            (
+                self.shortened_steps > 0,
+                "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it, or could not keep its sizes",
+            ),
+            (
+                !self.same_topology && is_new,
+                "parts or holes have come or gone: if they should not, use more `cells` or a larger `side_length`",
+            ),
+            (
+                !self.same_topology && !is_new,
+                "on the grid parts or holes have come or gone: if vertices nearby followed the wrong surface, use more `cells` or a larger `side_length`",
+            ),
+            (
+                self.touches_box,
+                "the shape touches the side of the box: a smaller `side_length` gives it room",
+            ),
+            (
+                !self.touches_box
+                    && self.energy_terms.is_none()
+                    && self
+                        .energy_over_8_pi
+                        .is_some_and(|spheres| spheres < NO_SURFACE),
+                "no closed surface has so little energy: the shape is near to its own periodic image, and a smaller `side_length` gives it room",
+            ),
+        ];
+        let holding = notes.into_iter().filter(|(holds, _)| *holds);
+        holding.map(|(_, note)| note).collect()
+    }
+}
+
+fn of_mesh(mesh: &MeshReport) -> String {
+    let moved = match mesh.left_behind_percent {
+        None => "the surface",
+        Some(_) => "vertices",
+    };
+    let sizes = match (mesh.volume_change_percent, mesh.area_change_percent) {
+        (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
+        _ => "the mesh is no longer closed, or folds over itself".to_owned(),
+    };
+    format!(
+        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}",
+        mesh.displacement_rms,
+        mesh.displacement_largest,
+        mesh.displacement_rms_percent,
+        mesh.displacement_largest_percent,
+    )
+}

@@ -1,0 +1,19 @@
+//! The options of a run, resolved, as a file in its folder.
+
+use crate::command::Command;
+use crate::prelude::*;
+
+/// The file of all options, resolved, in the folder of a run.
+pub const FILE: &str = "config.toml";
+/// The entry that names the job.
+pub const COMMAND: &str = "command";
+
+/// All options of a job as the text of the [file](FILE).
+///
+/// # Errors
+/// Options that TOML cannot hold, such as paths that are no text.
+pub fn resolved(command: &Command) -> Result<String> {
+    let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
+    let options = toml::to_string(command).map_err(unwritable)?;
+    Ok(format!("{COMMAND} = {:?}\n{options}", command.name()))
+}
