@@ -368,7 +368,7 @@ fn thin_strokes_get_the_cells_that_they_need_or_are_refused() {
     stroke(0.8);
     let line = refused(folder.path(), &[&flow[..], &["hair"]].concat());
     assert!(
-        line.contains("% of the boundary") && line.contains("--cells 512"),
+        line.contains("% of the boundary") && line.contains("512 cells per unit length"),
         "{line}"
     );
     let warned = run(
