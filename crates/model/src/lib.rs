@@ -28,7 +28,7 @@
 //!
 //! `K` is a convolution kernel of odd width `n_K` and `F: R -> R` a perceptron `1-32-16-8-4-2-1` ([`Mlp`]), trained so that
 //! shrinking spheres follow mean curvature flow (Bretin, Denis, Masnou and Terii, J. Comput. Phys. 470,
-//! 2022; the form used by Rumpf, Sassen and Smoch). The operator depends only on the ratios `eps / h` and
+//! 2022; the form used by Rumpf, Sassen and Norden-Smoch). The operator depends only on the ratios `eps / h` and
 //! `tautilde / h^2` ([`Ratios`]), so one network serves every grid that has them. [`Networks`]
 //! chooses among the user's and the shipped ones.
 //!
