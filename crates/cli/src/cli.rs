@@ -286,7 +286,8 @@ pub struct RunOptions {
     #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
     pub checkpoint_every: usize,
 
-    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    /// Axis that points up in pictures and on the page, which meshes that are written name: x, y or z [default: the one that the mesh names, or
+    /// else y for .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
 
@@ -460,7 +461,8 @@ pub struct SampleOptions {
     #[arg(long)]
     pub resample: bool,
 
-    /// Axis that points up in a picture: x, y or z [default: y for .obj, otherwise z]
+    /// Axis that points up in a picture, which a mesh that is written names: x, y or z [default: the one that the input names, or else y for
+    /// .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
 

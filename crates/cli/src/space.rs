@@ -70,7 +70,7 @@ impl Presentation<3> for Space {
     }
 
     fn save(&self, u: &Stored<3>, eps: f64, path: &Path) -> Result<()> {
-        Ok(surfaces::write(path, &surface(u, eps)?)?)
+        Ok(surfaces::write_with_up(path, &surface(u, eps)?, self.up)?)
     }
 
     fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Option<Faired>> {

@@ -67,6 +67,11 @@ fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
     for (file, up) in [("box.obj", "1"), ("box.ply", "2")] {
         let sample = ["sample", "builtin:cube", "--cells", "24", "--save", file];
         outcome(folder.path(), &[&sample[..], &cut].concat());
+        if file == "box.obj" {
+            // What other programs write does not name it.
+            let text = fs::read_to_string(folder.path().join(file)).unwrap();
+            fs::write(folder.path().join(file), text.replace("# up z\n", "")).unwrap();
+        }
         let flow = ["flow", file, "--cells", "24", "--steps", "1", "--output"];
         for (chosen, up) in [(&[][..], up), (&["--up", "x"], "0")] {
             let name = format!("{file}-{up}");
@@ -80,6 +85,49 @@ fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
     fs::remove_file(folder.path().join("box.obj-1/index.html")).unwrap();
     outcome(folder.path(), &["resume", "box.obj-1"]);
     assert!(page(folder.path(), "box.obj-1").contains("data-up=\"1\""));
+}
+
+/// Meshes keep their coordinates in every format, and name the axis where it is not the usual one.
+#[test]
+fn a_mesh_that_was_an_obj_file_stands_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let cut = ["--without", "box:-0.5,-0.5,0.1,0.5,0.5,0.5"];
+    let sample = |from: &str, to: &str, more: &[&str]| {
+        outcome(
+            folder.path(),
+            &[&["sample", from, "--save", to], more].concat(),
+        );
+    };
+    sample(
+        "builtin:cube",
+        "z.obj",
+        &[&["--cells", "24"], &cut[..]].concat(),
+    );
+    let text = fs::read_to_string(at("z.obj")).unwrap();
+    // What other programs write does not name it.
+    fs::write(at("box.obj"), text.replace("# up z\n", "")).unwrap();
+    for (from, to, up) in [
+        ("box.obj", "box.ply", "y"),
+        ("box.obj", "box.stl", "y"),
+        ("box.ply", "back.obj", "y"),
+        ("box.stl", "again.ply", "y"),
+        ("z.obj", "z.ply", "z"),
+    ] {
+        sample(from, to, &[]);
+        assert_eq!(surfaces::up_axis(at(to)).unwrap().to_string(), up, "{to}");
+    }
+    for (file, up) in [("box.ply", 1), ("box.stl", 1), ("z.obj", 2)] {
+        let flow = ["flow", file, "--cells", "24", "--steps", "1", "--output"];
+        let name = format!("run-{file}");
+        outcome(folder.path(), &[&flow[..], &[&name]].concat());
+        let expected = format!("data-up=\"{up}\"");
+        assert!(page(folder.path(), &name).contains(&expected), "{name}");
+        for mesh in ["start.ply", "final.ply"] {
+            let written = surfaces::up_axis(at(&name).join(mesh)).unwrap();
+            assert_eq!(written.index(), up, "{name}/{mesh}");
+        }
+    }
 }
 
 #[test]

@@ -61,15 +61,17 @@ pub fn run(mut options: SampleOptions, messages: MessageOptions) -> Result<()> {
             mesh.normals = None;
             mesh.roughen(noise, options.seed);
         }
-        surfaces::write(&path, &mesh)?;
+        let up = options.up.map_or_else(|| surfaces::up_axis(from), Ok)?;
+        surfaces::write_with_up(&path, &mesh, up)?;
     } else {
         match reader.load()? {
             Loaded::Plane(start) => write(start, options, &path)?,
-            Loaded::Space(start) if noise > 0.0 => {
+            Loaded::Space(mut start) if noise > 0.0 => {
+                start.presentation.turn(&mut options.up)?;
                 let u = without(start.initial.field()?, &options.without)?;
                 let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
                 mesh.roughen(noise, options.seed);
-                surfaces::write(&path, &mesh)?;
+                surfaces::write_with_up(&path, &mesh, start.presentation.up)?;
             }
             Loaded::Space(start) => write(start, options, &path)?,
         }
