@@ -198,7 +198,8 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "RATIO")]
     pub eps_over_h: Option<f64>,
 
-    /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
+    /// Which formulation of a step: accurate, the most accurate network, calibrated; calibrated, the paper's network, calibrated; or paper, as
+    /// in the paper
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -286,7 +287,7 @@ pub struct RunOptions {
     #[arg(long, value_name = "STEPS", value_parser = count, default_value_t = 5)]
     pub checkpoint_every: usize,
 
-    /// Axis that points up in pictures and on the page, which meshes that are written name: x, y or z [default: the one that the mesh names, or
+    /// Axis that points up in pictures, on the page and in meshes that are written: x, y or z [default: the one that the mesh names, or
     /// else y for .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
@@ -461,7 +462,7 @@ pub struct SampleOptions {
     #[arg(long)]
     pub resample: bool,
 
-    /// Axis that points up in a picture, which a mesh that is written names: x, y or z [default: the one that the input names, or else y for
+    /// Axis that points up in a picture or a mesh that is written: x, y or z [default: the one that the input names, or else y for
     /// .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,

@@ -20,6 +20,7 @@ mod space;
 mod standard;
 mod values;
 mod volume;
+mod words;
 
 use std::ffi::OsString;
 use std::io::Write;

@@ -52,11 +52,78 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
         assert!(!html.contains("src=\"http") && !html.contains("href=\"http"));
         assert!(html.contains("Willmore energy") && html.contains("builtin:cube"));
         assert!(html.contains("How far the surface has gone"), "{name}");
+        assert_numbers_have_words(&html);
         assert!(
             html.contains(">time step<") && !html.contains(">hvp<"),
             "{name}"
         );
     }
+}
+
+/// Keys are for programs: no entry begins with one.
+fn assert_numbers_have_words(html: &str) {
+    let names = html.split("<dt>").skip(1);
+    let names: Vec<&str> = names
+        .map(|name| name.split("</dt>").next().unwrap())
+        .collect();
+    assert!(names.len() > 20);
+    for name in names {
+        let key = name.split(' ').next().unwrap();
+        assert!(
+            !key.contains('_') && name.starts_with(char::is_uppercase),
+            "{name}"
+        );
+    }
+}
+
+/// Noise is taken off: nothing grows, and no room is left for it.
+#[test]
+fn a_mesh_that_is_faired_fills_its_pictures_before_and_after() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = [
+        "sample",
+        "builtin:torus",
+        "--cells",
+        "32",
+        "--noise",
+        "0.01",
+    ];
+    outcome(
+        folder.path(),
+        &[&sample[..], &["--save", "noisy.obj"]].concat(),
+    );
+    let fair = [
+        "fair",
+        "noisy.obj",
+        "--cells",
+        "48",
+        "--steps",
+        "1",
+        "--output",
+        "fair",
+    ];
+    outcome(folder.path(), &fair);
+    let html = page(folder.path(), "fair");
+    assert_numbers_have_words(&html);
+    assert!(html.contains("<dt>How far the vertices of the mesh have gone, root mean square, in units of the input</dt>"));
+    assert_eq!(html.matches("src=\"data:image/png;").count(), 2);
+    for label in ["before", "after"] {
+        assert!(html.contains(&format!("<span>{label}</span>")), "{label}");
+    }
+    let path = folder.path().join("fair/final.png");
+    let picture = images::colours(&path, &fs::read(&path).unwrap()).unwrap();
+    let [width, height] = picture.size();
+    let is_drawn = |x: u32, y: u32| picture.pixel(x, y) != [255; 4];
+    let columns = (0..width)
+        .filter(|&x| (0..height).any(|y| is_drawn(x, y)))
+        .count();
+    let rows = (0..height)
+        .filter(|&y| (0..width).any(|x| is_drawn(x, y)))
+        .count();
+    assert!(
+        columns.max(rows) > 9 * width as usize / 10,
+        "{columns} x {rows}"
+    );
 }
 
 /// Most OBJ files have y up; every other axis can be chosen, and a run that is resumed keeps it.
@@ -143,6 +210,7 @@ fn a_run_in_the_plane_has_a_page_with_drawings() {
         let frame = format!("class=\"frame\" data-label=\"{label}\"");
         assert!(html.contains(&frame), "{label}");
     }
+    assert_numbers_have_words(&html);
     let rows = html.split("<tbody>").nth(1).unwrap();
     assert_eq!(
         rows.split("</tbody>")
