@@ -184,7 +184,13 @@ impl Scene {
     fn camera(&self, model: &Model, size: [u32; 2]) -> Result<Camera, Error> {
         let points: Vec<DVec3> = match &self.framed {
             None => {
-                let own = model.vertices.iter().map(|vertex| vertex.place);
+                // Vertices of no triangle are not seen.
+                let mut seen = vec![false; model.vertices.len()];
+                for &corner in model.triangles.as_flattened() {
+                    seen[corner as usize] = true;
+                }
+                let own = model.vertices.iter().zip(seen).filter(|(_, seen)| *seen);
+                let own = own.map(|(vertex, _)| vertex.place);
                 own.chain(self.beside.iter().copied()).collect()
             }
             Some(bounds) => {

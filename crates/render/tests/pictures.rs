@@ -133,6 +133,19 @@ fn surfaces_beside_each_other_have_one_frame() {
 }
 
 #[test]
+fn vertices_of_no_triangle_take_no_room() {
+    let mut mesh = surfaces::phase_field_surface(&field(&ball([0.0; 3], 0.3)), EPS).unwrap();
+    mesh.normals = None;
+    let picture = |mesh: &TriangleMesh| {
+        let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);
+        scene.render([60; 2]).unwrap()
+    };
+    let before = picture(&mesh);
+    mesh.vertices.push([9.0; 3]);
+    assert_eq!(picture(&mesh), before);
+}
+
+#[test]
 fn the_outline_is_smooth() {
     let picture = scene(&ball([0.0; 3], 0.3)).render([120; 2]).unwrap();
     for (at, pixel) in picture.pixels().iter().enumerate() {
