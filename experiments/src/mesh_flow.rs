@@ -37,7 +37,7 @@ struct Options {
     #[arg(long, value_name = "COUNT")]
     steps: Option<usize>,
 
-    /// The axis that points up in the pictures: x, y or z [default: that of the paper's mesh; of another one the usual one of its format, y
+    /// The axis that points up in the pictures: x, y or z [default: that of the paper's mesh; of another one the one that it names, or else y
     /// in OBJ files, z in PLY and STL files]
     #[arg(long, value_name = "AXIS")]
     up: Option<UpAxis>,
@@ -59,7 +59,7 @@ impl MeshFlow {
         let steps = (options.steps).unwrap_or(if run.quick { 2 } else { self.steps + more });
         require(steps > 0, "--steps must be at least 1")?;
         let mesh = options.mesh.load(&self.mesh, &setting.grid)?;
-        let usual = options.mesh.mesh.as_ref().map(surfaces::usual_up_axis);
+        let usual = options.mesh.mesh.as_ref().map(surfaces::up_axis);
         let up = (options.up.or(usual.transpose()?)).unwrap_or(self.view.up);
         let others = json!({ "mesh": mesh.about, "tau": time_steps.rule, "steps": steps });
         let parameters = setting.parameters(others)?;

@@ -16,7 +16,7 @@ of a run the last step was finished and stored, and `willmore resume` goes on.";
 /// Willmore flow of meshes, images and fields.
 ///
 /// Surfaces and curves are made smooth by the gradient flow of their bending energy, with the hybrid scheme of Rumpf, Sassen
-/// and Smoch: a learned step of mean curvature flow inside a minimizing movement.
+/// and Norden-Smoch: a learned step of mean curvature flow inside a minimizing movement.
 #[derive(Parser, Debug)]
 #[command(name = "willmore", version, after_help = EXIT_CODES, max_term_width = 120)]
 #[command(args_override_self = true, disable_help_subcommand = true)]

@@ -52,11 +52,78 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
         assert!(!html.contains("src=\"http") && !html.contains("href=\"http"));
         assert!(html.contains("Willmore energy") && html.contains("builtin:cube"));
         assert!(html.contains("How far the surface has gone"), "{name}");
+        assert_numbers_have_words(&html);
         assert!(
             html.contains(">time step<") && !html.contains(">hvp<"),
             "{name}"
         );
     }
+}
+
+/// Keys are for programs: no entry begins with one.
+fn assert_numbers_have_words(html: &str) {
+    let names = html.split("<dt>").skip(1);
+    let names: Vec<&str> = names
+        .map(|name| name.split("</dt>").next().unwrap())
+        .collect();
+    assert!(names.len() > 20);
+    for name in names {
+        let key = name.split(' ').next().unwrap();
+        assert!(
+            !key.contains('_') && name.starts_with(char::is_uppercase),
+            "{name}"
+        );
+    }
+}
+
+/// Noise is taken off: nothing grows, and no room is left for it.
+#[test]
+fn a_mesh_that_is_faired_fills_its_pictures_before_and_after() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = [
+        "sample",
+        "builtin:torus",
+        "--cells",
+        "32",
+        "--noise",
+        "0.01",
+    ];
+    outcome(
+        folder.path(),
+        &[&sample[..], &["--save", "noisy.obj"]].concat(),
+    );
+    let fair = [
+        "fair",
+        "noisy.obj",
+        "--cells",
+        "48",
+        "--steps",
+        "1",
+        "--output",
+        "fair",
+    ];
+    outcome(folder.path(), &fair);
+    let html = page(folder.path(), "fair");
+    assert_numbers_have_words(&html);
+    assert!(html.contains("<dt>How far the vertices of the mesh have gone, root mean square, in units of the input</dt>"));
+    assert_eq!(html.matches("src=\"data:image/png;").count(), 2);
+    for label in ["before", "after"] {
+        assert!(html.contains(&format!("<span>{label}</span>")), "{label}");
+    }
+    let path = folder.path().join("fair/final.png");
+    let picture = images::colours(&path, &fs::read(&path).unwrap()).unwrap();
+    let [width, height] = picture.size();
+    let is_drawn = |x: u32, y: u32| picture.pixel(x, y) != [255; 4];
+    let columns = (0..width)
+        .filter(|&x| (0..height).any(|y| is_drawn(x, y)))
+        .count();
+    let rows = (0..height)
+        .filter(|&y| (0..width).any(|x| is_drawn(x, y)))
+        .count();
+    assert!(
+        columns.max(rows) > 9 * width as usize / 10,
+        "{columns} x {rows}"
+    );
 }
 
 /// Most OBJ files have y up; every other axis can be chosen, and a run that is resumed keeps it.
@@ -67,6 +134,11 @@ fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
     for (file, up) in [("box.obj", "1"), ("box.ply", "2")] {
         let sample = ["sample", "builtin:cube", "--cells", "24", "--save", file];
         outcome(folder.path(), &[&sample[..], &cut].concat());
+        if file == "box.obj" {
+            // What other programs write does not name it.
+            let text = fs::read_to_string(folder.path().join(file)).unwrap();
+            fs::write(folder.path().join(file), text.replace("# up z\n", "")).unwrap();
+        }
         let flow = ["flow", file, "--cells", "24", "--steps", "1", "--output"];
         for (chosen, up) in [(&[][..], up), (&["--up", "x"], "0")] {
             let name = format!("{file}-{up}");
@@ -82,6 +154,49 @@ fn the_axis_that_points_up_is_that_of_the_format_or_chosen() {
     assert!(page(folder.path(), "box.obj-1").contains("data-up=\"1\""));
 }
 
+/// Meshes keep their coordinates in every format, and name the axis where it is not the usual one.
+#[test]
+fn a_mesh_that_was_an_obj_file_stands_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let cut = ["--without", "box:-0.5,-0.5,0.1,0.5,0.5,0.5"];
+    let sample = |from: &str, to: &str, more: &[&str]| {
+        outcome(
+            folder.path(),
+            &[&["sample", from, "--save", to], more].concat(),
+        );
+    };
+    sample(
+        "builtin:cube",
+        "z.obj",
+        &[&["--cells", "24"], &cut[..]].concat(),
+    );
+    let text = fs::read_to_string(at("z.obj")).unwrap();
+    // What other programs write does not name it.
+    fs::write(at("box.obj"), text.replace("# up z\n", "")).unwrap();
+    for (from, to, up) in [
+        ("box.obj", "box.ply", "y"),
+        ("box.obj", "box.stl", "y"),
+        ("box.ply", "back.obj", "y"),
+        ("box.stl", "again.ply", "y"),
+        ("z.obj", "z.ply", "z"),
+    ] {
+        sample(from, to, &[]);
+        assert_eq!(surfaces::up_axis(at(to)).unwrap().to_string(), up, "{to}");
+    }
+    for (file, up) in [("box.ply", 1), ("box.stl", 1), ("z.obj", 2)] {
+        let flow = ["flow", file, "--cells", "24", "--steps", "1", "--output"];
+        let name = format!("run-{file}");
+        outcome(folder.path(), &[&flow[..], &[&name]].concat());
+        let expected = format!("data-up=\"{up}\"");
+        assert!(page(folder.path(), &name).contains(&expected), "{name}");
+        for mesh in ["start.ply", "final.ply"] {
+            let written = surfaces::up_axis(at(&name).join(mesh)).unwrap();
+            assert_eq!(written.index(), up, "{name}/{mesh}");
+        }
+    }
+}
+
 #[test]
 fn a_run_in_the_plane_has_a_page_with_drawings() {
     let folder = tempfile::tempdir().unwrap();
@@ -95,6 +210,7 @@ fn a_run_in_the_plane_has_a_page_with_drawings() {
         let frame = format!("class=\"frame\" data-label=\"{label}\"");
         assert!(html.contains(&frame), "{label}");
     }
+    assert_numbers_have_words(&html);
     let rows = html.split("<tbody>").nth(1).unwrap();
     assert_eq!(
         rows.split("</tbody>")

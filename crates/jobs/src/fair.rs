@@ -101,7 +101,8 @@ impl FairOptions {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = if repairs {
-            surfaces::encode(path, closed(path, true, watcher)?.mesh())?
+            let repaired = closed(path, true, watcher)?;
+            surfaces::encode_with_up(path, repaired.mesh(), surfaces::up_axis(path)?)?
         } else {
             files::read(path)?
         };

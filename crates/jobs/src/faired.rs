@@ -19,6 +19,7 @@ pub struct Faired {
     /// The extension and the bytes of a file with everything that the input had, unless the mesh is new.
     pub file: Option<(String, Vec<u8>)>,
     pub mesh: TriangleMesh,
+    pub up: UpAxis,
     pub displacement: Figure,
     pub report: MeshReport,
 }
@@ -35,6 +36,7 @@ impl Faired {
             displacement: figure(&mesh, &lengths, &none_lost, up)?,
             report: MeshReport::new(before, &mesh, &lengths),
             mesh,
+            up,
         })
     }
 
@@ -44,7 +46,7 @@ impl Faired {
         if let Some((_, bytes)) = self.file.as_ref().filter(same) {
             return Ok(files::write_atomically(path, |out| out.write_all(bytes))?);
         }
-        Ok(surfaces::write(path, &self.mesh)?)
+        Ok(surfaces::write_with_up(path, &self.mesh, self.up)?)
     }
 }
 

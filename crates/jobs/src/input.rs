@@ -263,7 +263,7 @@ impl<'a> Reader<'a> {
         Ok(match self.source.clone() {
             Source::Mesh(path) => {
                 let mesh = closed(&path, self.options.repair, self.watcher)?;
-                self.mesh(&mesh, surfaces::usual_up_axis(&path)?)?
+                self.mesh(&mesh, surfaces::up_axis(&path)?)?
             }
             Source::Image(path) => self.image(&path)?,
             Source::Volume(path) => self.volume(&path)?,
@@ -465,7 +465,7 @@ impl<'a> Reader<'a> {
         });
         let region = own.nodes(grid);
         let presentation = Space {
-            up: surfaces::usual_up_axis(path)?,
+            up: surfaces::up_axis(path)?,
             input: Some(Topology::of(rough)),
             own: Some(own),
             ..Space::default()
@@ -541,10 +541,10 @@ impl<'a> Reader<'a> {
         match shapes::built_in(name, side)? {
             BuiltIn::Plane(shape) => Ok(Loaded::Plane(self.shape(&*shape)?)),
             BuiltIn::Space(shape) => Ok(Loaded::Space(self.shape(&*shape)?)),
-            BuiltIn::Mesh(mesh) => {
+            BuiltIn::Mesh(mesh, up) => {
                 let grid = self.grid()?;
                 let placement = Placement::fit(&mesh.bounding_box(), &grid, side)?;
-                self.mesh(&mesh.placed(&placement), UpAxis::default())
+                self.mesh(&mesh.placed(&placement), up)
             }
         }
     }

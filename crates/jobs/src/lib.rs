@@ -46,6 +46,7 @@ pub mod settings;
 mod space;
 pub mod values;
 mod volume;
+mod words;
 
 pub use case::check_eps_over_h;
 pub use command::Command;

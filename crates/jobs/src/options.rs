@@ -91,7 +91,8 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "RATIO", help_heading = ADVANCED, hide_short_help = true)]
     pub eps_over_h: Option<f64>,
 
-    /// accurate: the most accurate network, calibrated; calibrated: the paper's network, calibrated; paper: as in the paper
+    /// Which formulation of a step: accurate, the most accurate network, calibrated; calibrated, the paper's network, calibrated; or paper, as
+    /// in the paper
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -185,7 +186,8 @@ pub struct RunOptions {
     )]
     pub checkpoint_every: usize,
 
-    /// Axis that points up in pictures and on the page: x, y or z [default: y for .obj, otherwise z]
+    /// Axis that points up in pictures, on the page and in meshes that are written: x, y or z [default: the one that the mesh names, or
+    /// else y for .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS", help_heading = OUTPUT, hide_short_help = true)]
     pub up: Option<UpAxis>,
 
@@ -402,7 +404,8 @@ pub struct SampleOptions {
     #[arg(long)]
     pub resample: bool,
 
-    /// Axis that points up in a picture: x, y or z [default: y for .obj, otherwise z]
+    /// Axis that points up in a picture or a mesh that is written: x, y or z [default: the one that the input names, or else y for
+    /// .obj and builtin:figure, z for all others]
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
 

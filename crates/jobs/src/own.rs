@@ -249,6 +249,7 @@ impl OwnMesh {
             )),
             displacement: figure(&moved, &lengths, &lost, up)?,
             mesh: all,
+            up,
             report,
         })
     }

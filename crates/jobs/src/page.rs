@@ -3,17 +3,19 @@
 //! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the checkpoint
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
+use std::collections::BTreeSet;
+
 use engine::METRICS;
 use pages::{
-    Facts, ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames,
-    markdown, thinned, viewer,
+    ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames, markdown,
+    thinned, viewer,
 };
 use report::{Axis, LineChart, Marker, Series};
 
 use crate::outcome::{self, Summary};
 use crate::paths::MESHES;
 use crate::prelude::*;
-use crate::{own, plane, presentation, settings};
+use crate::{own, plane, presentation, settings, words};
 
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
 const MOST_FRAMES: usize = 60;
@@ -21,6 +23,8 @@ const MOST_FRAMES: usize = 60;
 const MOST_VERTICES: usize = 300_000;
 /// The same for rows of the table of steps.
 const MOST_ROWS: usize = 60;
+/// Pixels a side of the pictures of a surface before and after.
+const PIXELS: u32 = 480;
 /// Curves through fewer steps have a mark at each.
 const FEW_STEPS: usize = 40;
 
@@ -59,10 +63,12 @@ impl Files<'_> {
             .map_err(|error| Error::options(format!("the stored options: {error}")))?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
-            numbers.push(facts(&outcome.to_json()));
+            let dimension = engine::dimension(self.run)?;
+            numbers.push(words::numbers(&outcome.to_json(), dimension));
         }
-        let options = Section::new("Options").with(facts(&options));
-        let program = Section::new("Program, network and device").with(facts(about));
+        let options = words::options(&options, text("command"));
+        let options = Section::new("Options").with(options);
+        let program = Section::new("Program, network and device").with(words::program(about));
         Ok(page.with(numbers.with(options).with(program)))
     }
 
@@ -99,9 +105,7 @@ impl Files<'_> {
 
     fn surfaces(&self) -> Result<Option<Markup>> {
         let stages = self.stages(&MESHES);
-        // Until it is started, and on paper, the viewer is a picture.
-        let (Some(poster), Some((_, first))) = (self.read(presentation::PICTURE)?, stages.first())
-        else {
+        let Some((_, first)) = stages.first().filter(|_| self.has(presentation::PICTURE)) else {
             return Ok(None);
         };
         let read = |name: &str| surfaces::read(self.run.path().join(name));
@@ -111,10 +115,11 @@ impl Files<'_> {
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
             .collect::<Result<_>>()?;
         let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
+        let view = View::from_front_left(up.unwrap_or_default());
         Ok(Some(viewer(
             "The surface over the steps",
-            &ImageElement::from_bytes(presentation::PICTURE, &poster)?,
-            View::from_front_left(up.unwrap_or_default()),
+            &before_and_after(&meshes, view)?,
+            view,
             meshes.iter().map(|(label, mesh)| (*label, mesh)),
         )?))
     }
@@ -171,17 +176,20 @@ impl Files<'_> {
         let rows = || thinned(table.rows(), MOST_ROWS);
         let (shown, all) = (rows().count(), table.rows().len());
         let note = format!(
-            "{shown} of {all} steps in five digits; all digits of all steps are in `{METRICS}`."
+            "{shown} of {all} steps in five digits, in the units of the input; all digits of all steps are in `{METRICS}`."
         );
-        let head = table.head().iter().map(|key| in_words(&COLUMNS, key));
+        let head = table.head().iter().map(|key| words::column(key));
         let shortened = |cell: &String| cell.parse().map_or_else(|_| cell.clone(), five_digits);
         let rows = rows().map(|row| row.iter().map(shortened));
         let table = Section::new("Steps as a table")
             .with(markdown(&note))
             .with(TableElement::new("Steps", head, rows)?);
-        let caption = "Energy and measures of the shape at the beginning and after every step.";
+        let units = words::units(engine::dimension(self.run)?);
+        let caption = format!(
+            "Energy and measures of the shape at the beginning and after every step, in the units of the input: {units}."
+        );
         Ok(Section::new("Steps")
-            .with(figure(&image, caption))
+            .with(figure(&image, &caption))
             .with(table))
     }
 
@@ -216,41 +224,30 @@ impl Files<'_> {
     }
 }
 
-/// The entries of a map.
-fn facts(values: &Value) -> Facts {
-    let entries = values.as_object().into_iter().flatten();
-    entries.fold(Facts::default(), |facts, (key, value)| {
-        facts.with_value(&in_words(&KEYS, key), value)
-    })
+/// Pictures of the first and of the last surface, which together fill them.
+fn before_and_after(
+    meshes: &[(&str, TriangleMesh)],
+    view: View,
+) -> Result<Vec<(String, ImageElement)>> {
+    let ends = match meshes {
+        [only] => vec![only],
+        [first, .., last] => vec![first, last],
+        [] => vec![],
+    };
+    let pictures = ends.iter().map(|(label, mesh)| {
+        let others = ends.iter().flat_map(|(_, other)| corners(other));
+        let scene = Scene::of_mesh(mesh.clone()).view(view).beside(others);
+        let picture = scene.render([PIXELS; 2])?.to_png()?;
+        let image = ImageElement::from_bytes(label, &picture)?;
+        Ok(((*label).to_owned(), image))
+    });
+    pictures.collect()
 }
 
-/// Columns of the steps in words,
-const COLUMNS: [(&str, &str); 6] = [
-    ("tau", "time step"),
-    ("energy_before", "objective before"),
-    ("energy", "objective after"),
-    ("newton", "Newton steps"),
-    ("hvp", "Hessian products"),
-    ("halvings", "times shortened"),
-];
-/// and keys of the outcome.
-const KEYS: [(&str, &str); 8] = [
-    ("first_energy", "energy at the beginning"),
-    (
-        "energy_terms",
-        "spontaneous curvature, tension and pressure",
-    ),
-    ("energy_over_8_pi", "Willmore energy over that of a sphere"),
-    ("components", "closed parts"),
-    ("mesh", "movement of the surface"),
-    ("same_topology", "as many parts and holes as before"),
-    ("touches_box", "touches the side of the box"),
-    ("shortened_steps", "steps that were shortened"),
-];
-
-fn in_words(known: &[(&str, &str)], key: &str) -> String {
-    match known.iter().find(|(name, _)| *name == key) {
-        Some((_, words)) => (*words).to_owned(),
-        None => key.replace('_', " "),
-    }
+/// The vertices that faces have.
+fn corners(mesh: &TriangleMesh) -> impl Iterator<Item = [f64; 3]> {
+    let corners: BTreeSet<u32> = mesh.faces.as_flattened().iter().copied().collect();
+    corners
+        .into_iter()
+        .map(|vertex| mesh.vertices[vertex as usize])
 }

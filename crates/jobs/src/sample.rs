@@ -41,15 +41,17 @@ pub fn sample(mut options: SampleOptions, watcher: &dyn Watcher) -> Result<()> {
             mesh.normals = None;
             mesh.roughen(noise, options.seed);
         }
-        return Ok(surfaces::write(&path, &mesh)?);
+        let up = options.up.map_or_else(|| surfaces::up_axis(from), Ok)?;
+        return Ok(surfaces::write_with_up(&path, &mesh, up)?);
     }
     match reader.load()? {
         Loaded::Plane(start) => write(start, options, &path)?,
-        Loaded::Space(start) if noise > 0.0 => {
+        Loaded::Space(mut start) if noise > 0.0 => {
+            start.presentation.turn(&mut options.up)?;
             let u = without(start.initial.field()?, &options.without)?;
             let mut mesh = surfaces::remeshed_surface(&u, eps(&u))?;
             mesh.roughen(noise, options.seed);
-            surfaces::write(&path, &mesh)?;
+            surfaces::write_with_up(&path, &mesh, start.presentation.up)?;
         }
         Loaded::Space(start) => write(start, options, &path)?,
     }

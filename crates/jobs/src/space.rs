@@ -35,6 +35,14 @@ pub struct Voxels {
     pub time: Option<f64>,
 }
 
+impl Space {
+    /// Whether what is taken off is noise, or the staircase of voxels, so that there is no growth to leave room for.
+    fn hardly_moves(&self) -> bool {
+        let ends_early = |voxels: Voxels| voxels.farthest.is_some();
+        self.own.is_some() || self.voxels.is_some_and(ends_early)
+    }
+}
+
 impl Presentation<3> for Space {
     const SAVED: &'static [&'static str] = &MESHES;
     const USUAL: &'static str = MESHES[0];
@@ -55,6 +63,10 @@ impl Presentation<3> for Space {
 
     fn picture(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Picture> {
         let mut scene = Scene::new(u, eps)?.view(View::from_front_left(self.up));
+        if self.hardly_moves() {
+            let start = surfaces::phase_field_surface(start, eps)?;
+            return Ok(scene.beside(start.vertices).render([PIXELS; 2])?);
+        }
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|b| b.grown([ROOM * b.longest_side(); 3]));
         let both = start.into_iter().chain(scene.bounds());
@@ -70,7 +82,7 @@ impl Presentation<3> for Space {
     }
 
     fn save(&self, u: &Stored<3>, eps: f64, path: &Path) -> Result<()> {
-        Ok(surfaces::write(path, &surface(u, eps)?)?)
+        Ok(surfaces::write_with_up(path, &surface(u, eps)?, self.up)?)
     }
 
     fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Option<Faired>> {

@@ -15,7 +15,7 @@ for (const image of document.images) {
   image.addEventListener("error", () => markMissing(image));
 }
 
-// What a viewer shows: the part of the picture that is covered, and how many shades there are.
+// What a viewer shows: the part of the picture that is covered, how many shades there are, and the larger part of a side that is taken.
 function covered(viewer) {
   const { gl, canvas } = viewer;
   viewer.draw();
@@ -23,12 +23,18 @@ function covered(viewer) {
   gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   let count = 0;
   const shades = new Set();
+  const [low, high] = [[canvas.width, canvas.height], [0, 0]];
   for (let k = 0; k < pixels.length; k += 4) {
     if (pixels[k + 3] < 255) continue;
     count++;
     shades.add(pixels[k]);
+    [(k / 4) % canvas.width, Math.floor(k / 4 / canvas.width)].forEach((place, i) => {
+      low[i] = Math.min(low[i], place);
+      high[i] = Math.max(high[i], place + 1);
+    });
   }
-  return { part: (4 * count) / pixels.length, shades: shades.size };
+  const taken = Math.max((high[0] - low[0]) / canvas.width, (high[1] - low[1]) / canvas.height);
+  return { part: (4 * count) / pixels.length, shades: shades.size, taken };
 }
 
 // Nothing here waits: who reads the attribute after the page is loaded finds it.
@@ -45,13 +51,17 @@ function checkPage() {
       problems.push(name + " does not start");
       continue;
     }
+    let most = 0;
     viewer.blocks.forEach((block, k) => {
       if (viewer.show) viewer.show(k);
-      const { part, shades } = covered(viewer);
+      const { part, shades, taken } = covered(viewer);
+      most = Math.max(most, taken);
       if (part < 0.01 || part > 0.95 || shades < 8) {
         problems.push(`${name}, ${block.dataset.label}: ${(100 * part).toFixed(1)} % covered, ${shades} shades`);
       }
     });
+    // The shape may grow or shrink; at its largest it fills the view.
+    if (most < 0.8 || most >= 1) problems.push(`${name} takes ${(100 * most).toFixed(0)} % of its view`);
     viewer.show?.(0);
   }
   for (const link of document.querySelectorAll('a[href^="#"]')) {

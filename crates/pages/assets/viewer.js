@@ -1,7 +1,12 @@
 // Surfaces to turn. The camera is that of the crate `render`: azimuth and elevation about the
-// upward axis, angle of view 22 degrees, all surfaces of a viewer framed by one ball.
+// upward axis, its distance that of an angle of view of 22 degrees for the ball around all surfaces
+// of a viewer. Together they fill the first view.
 const FIELD_OF_VIEW = (22 * Math.PI) / 180;
 const DEGREE = Math.PI / 180;
+// Of the eye from the centre of the ball, in units of its radius.
+const DISTANCE = 1.08 / Math.sin(FIELD_OF_VIEW / 2);
+// Part of a side of the view that the surfaces take.
+const FILLED = 0.95;
 
 const VERTEX_SHADER = `
 attribute vec3 position;
@@ -69,6 +74,36 @@ function decodeSurface(block, centre) {
   return { positions, corners, normals: given ? normals : smoothNormals(positions, corners) };
 }
 
+const along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+// Where right, above and toward the eye are, seen from a direction.
+function directions(up, azimuth, elevation) {
+  const axis = (k) => [0, 1, 2].map((i) => (i === k % 3 ? 1 : 0));
+  const [u, a, b] = [axis(up), axis(up + 1), axis(up + 2)];
+  const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+  const horizontal = [0, 1, 2].map((i) => ca * a[i] + sa * b[i]);
+  return {
+    right: [0, 1, 2].map((i) => ca * b[i] - sa * a[i]),
+    above: [0, 1, 2].map((i) => ce * u[i] - se * horizontal[i]),
+    toward: [0, 1, 2].map((i) => ce * horizontal[i] + se * u[i]),
+  };
+}
+
+// The middle of the outline as it is seen, in slopes against the axis of view, and the focal length with which it fills a view
+// whose sides have these lengths in units of the shorter one.
+function framed(outline, { right, above, toward }, sides) {
+  const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
+  for (const point of outline) {
+    const depth = DISTANCE - along(point, toward);
+    [along(point, right) / depth, along(point, above) / depth].forEach((slope, i) => {
+      low[i] = Math.min(low[i], slope);
+      high[i] = Math.max(high[i], slope);
+    });
+  }
+  const focal = [0, 1].map((i) => (2 * FILLED * sides[i]) / Math.max(high[i] - low[i], 1e-9));
+  return { middle: [0, 1].map((i) => (low[i] + high[i]) / 2), focal: Math.min(...focal) };
+}
+
 // Sums over the faces around a vertex; the cross product weighs them by area.
 function smoothNormals(positions, corners) {
   const normals = new Float32Array(positions.length);
@@ -101,6 +136,8 @@ class SurfaceViewer {
       centre: figure.dataset.centre.split(" ").map(Number),
       radius: Number(figure.dataset.radius),
     };
+    const outline = figure.dataset.outline.split(" ").map(Number);
+    this.outline = Array.from({ length: outline.length / 3 }, (_, k) => outline.slice(3 * k, 3 * k + 3));
     this.surfaces = new Map();
     this.step = 0;
     this.reset();
@@ -109,7 +146,7 @@ class SurfaceViewer {
     this.button.className = "start";
     this.button.textContent = "Turn in 3D";
     this.button.addEventListener("click", () => this.start() && this.canvas.focus());
-    this.stage.append(this.button);
+    this.stage.after(this.button);
   }
 
   reset() {
@@ -222,27 +259,28 @@ class SurfaceViewer {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
 
-    const axis = (k) => [0, 1, 2].map((i) => (i === k % 3 ? 1 : 0));
-    const up = Number(this.figure.dataset.up);
-    const [u, a, b] = [axis(up), axis(up + 1), axis(up + 2)];
-    const [sa, ca, se, ce] = [
-      Math.sin(this.azimuth), Math.cos(this.azimuth), Math.sin(this.elevation), Math.cos(this.elevation),
-    ];
-    const horizontal = [0, 1, 2].map((i) => ca * a[i] + sa * b[i]);
-    const right = [0, 1, 2].map((i) => ca * b[i] - sa * a[i]);
-    const above = [0, 1, 2].map((i) => ce * u[i] - se * horizontal[i]);
-    const toward = [0, 1, 2].map((i) => ce * horizontal[i] + se * u[i]);
-
-    // In units of the ball's radius it lies between the planes at `distance - 1` and `distance + 1`.
-    const distance = 1.08 / Math.sin(FIELD_OF_VIEW / 2);
-    const [near, far] = [distance - 1.05, distance + 1.05];
-    const focal = this.zoom / Math.tan(FIELD_OF_VIEW / 2);
     const shorter = Math.min(width, height);
-    const [fx, fy] = [(focal * shorter) / width, (focal * shorter) / height];
+    const sides = [width / shorter, height / shorter];
+    const up = Number(this.figure.dataset.up);
+    const { azimuth, elevation } = this.figure.dataset;
+    const first = framed(this.outline, directions(up, azimuth * DEGREE, elevation * DEGREE), sides);
+    const seen = directions(up, this.azimuth, this.elevation);
+    const { right, above, toward } = seen;
+    const frame = framed(this.outline, seen, sides);
+    // As large as in the first view, but where it would be cut off as it is turned.
+    const focal = this.zoom * Math.min(first.focal, frame.focal);
+    const [fx, fy] = sides.map((side) => focal / side);
+
+    // In units of the ball's radius it lies between the planes at `DISTANCE - 1` and `DISTANCE + 1`.
+    const [near, far] = [DISTANCE - 1.05, DISTANCE + 1.05];
     const depth = [(far + near) / (far - near), (-2 * far * near) / (far - near)];
     const row = (direction, scale) => [...direction, 0].map((v) => (scale * v) / ball.radius);
     const [x, y, z] = [row(right, fx), row(above, fy), row(toward, -1)];
-    z[3] += distance; // Now the distance in front of the eye.
+    z[3] += DISTANCE; // Now the distance in front of the eye.
+    z.forEach((v, i) => {
+      x[i] -= fx * frame.middle[0] * v;
+      y[i] -= fy * frame.middle[1] * v;
+    });
     const rows = [x, y, z.map((v, i) => depth[0] * v + (i === 3 ? depth[1] : 0)), z];
     const columns = [0, 1, 2, 3].flatMap((c) => rows.map((r) => r[c]));
     gl.uniformMatrix4fv(uniforms.camera, false, columns);

@@ -30,6 +30,35 @@ impl ImageElement {
         Ok(Self { mime, data, size })
     }
 
+    /// A smaller picture, at most so many pixels wide, of the PNG file with these bytes; where that is taller than wide, of its upper part, three
+    /// by two.
+    pub(crate) fn reduced(name: &str, bytes: &[u8], most: usize) -> Result<Self> {
+        let (mut size, pixels) = pixels(bytes).map_err(|problem| Error::Picture {
+            name: name.to_owned(),
+            problem,
+        })?;
+        if size[1] > size[0] {
+            size[1] = (2 * size[0]).div_ceil(3);
+        }
+        let factor = size[0].div_ceil(most);
+        let smaller = size.map(|side| side.div_ceil(factor));
+        // Each is the mean of a square, at the lower and right ends of a part of it.
+        let mean = |k: usize| {
+            let squares = [k % smaller[0], k / smaller[0]];
+            let [columns, rows] =
+                [0, 1].map(|i| factor * squares[i]..(factor * (squares[i] + 1)).min(size[i]));
+            let count = columns.len() * rows.len();
+            let mut sum = [0; 4];
+            for pixel in rows.flat_map(|row| &pixels[size[0] * row..][columns.clone()]) {
+                sum = std::array::from_fn(|c| sum[c] + usize::from(pixel[c]));
+            }
+            sum.map(|sum| ((sum + count / 2) / count) as u8)
+        };
+        let pixels = (0..smaller[0] * smaller[1]).map(mean).collect();
+        let picture = render::Picture::new(smaller.map(|side| side as u32), pixels)?;
+        Self::from_bytes(name, &picture.to_png()?)
+    }
+
     /// The element; `alternative` is for readers who cannot see the picture.
     pub(crate) fn html(&self, alternative: &str) -> Markup {
         // With the size known beforehand, nothing jumps while a page is loaded.
@@ -42,10 +71,19 @@ impl ImageElement {
 
 /// The size of a PNG picture. All of it is read, so that damage is found here and not by those who look at the page.
 fn png(bytes: &[u8]) -> Result<[u32; 2], String> {
+    let (size, ..) = decoded(bytes, png::Transformations::IDENTITY)?;
+    Ok(size)
+}
+
+/// The size of a PNG picture, how many channels a pixel has, and all of them.
+fn decoded(
+    bytes: &[u8],
+    as_what: png::Transformations,
+) -> Result<([u32; 2], usize, Vec<u8>), String> {
     let line = |error: png::DecodingError| error.to_string();
-    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))
-        .read_info()
-        .map_err(line)?;
+    let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+    decoder.set_transformations(as_what);
+    let mut reader = decoder.read_info().map_err(line)?;
     let info = reader.info();
     let size = [info.width, info.height];
     let length = reader
@@ -54,7 +92,21 @@ fn png(bytes: &[u8]) -> Result<[u32; 2], String> {
     let mut pixels = vec![0; length];
     reader.next_frame(&mut pixels).map_err(line)?;
     reader.finish().map_err(line)?;
-    Ok(size)
+    Ok((size, reader.output_color_type().0.samples(), pixels))
+}
+
+/// The pixels of a PNG picture with opacity, and its size.
+fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<[u8; 4]>), String> {
+    let as_what = png::Transformations::normalize_to_color8() | png::Transformations::ALPHA;
+    let (size, channels, values) = decoded(bytes, as_what)?;
+    let pixels = match channels {
+        // Grey.
+        2 => (values.as_chunks().0.iter())
+            .map(|&[tone, opacity]| [tone, tone, tone, opacity])
+            .collect(),
+        _ => values.as_chunks().0.to_vec(),
+    };
+    Ok((size.map(|side| side as usize), pixels))
 }
 
 /// The size of an SVG picture, if it has one.
@@ -93,6 +145,23 @@ mod tests {
         let svg = ImageElement::from_bytes("drawing", svg).unwrap();
         assert_eq!(svg.size, Some([80, 40]));
         assert_eq!(svg.mime, "image/svg+xml");
+    }
+
+    #[test]
+    fn smaller_pictures_are_means() {
+        let pixels_of_rows = [0, 4, 9, 0, 4, 9].map(|tone| [tone, 0, 0, 255]);
+        let picture = render::Picture::new([3, 2], pixels_of_rows.to_vec()).unwrap();
+        let bytes = picture.to_png().unwrap();
+        for (most, tones) in [(3, &[0, 4, 9, 0, 4, 9][..]), (2, &[2, 9]), (1, &[4])] {
+            let reduced = ImageElement::reduced("rows", &bytes, most).unwrap();
+            let (_, back) = pixels(&STANDARD.decode(reduced.data).unwrap()).unwrap();
+            let found: Vec<u8> = back.iter().map(|pixel| pixel[0]).collect();
+            assert_eq!(found, tones);
+        }
+        let tall = [&pixels_of_rows[..], &[[7, 0, 0, 255]; 21]].concat();
+        let tall = render::Picture::new([3, 9], tall).unwrap();
+        let reduced = ImageElement::reduced("tall", &tall.to_png().unwrap(), 3).unwrap();
+        assert_eq!(reduced.size, Some([3, 2]));
     }
 
     #[test]

@@ -14,7 +14,8 @@
 //!         .render([160, 120])?;
 //!
 //!     let poster = ImageElement::from_bytes("ball", &picture.to_png()?)?;
-//!     let ball = viewer("A ball", &poster, View::default(), [("step 0", &mesh)])?;
+//!     let posters = [("step 0".to_owned(), poster)];
+//!     let ball = viewer("A ball", &posters, View::default(), [("step 0", &mesh)])?;
 //!     let table = TableElement::from_csv("Errors", "n,error\n64,0.01\n128,0.0025\n")?;
 //!     let parameters = Section::new("Parameters").with(Facts::default().with("eps", "2 h"));
 //!     let page = Page::new("Balls & spheres")

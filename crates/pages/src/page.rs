@@ -10,6 +10,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use crate::error::Result;
 use crate::image::ImageElement;
+use crate::text::markdown;
 
 const STYLE: &str = include_str!("../assets/page.css");
 const CONTROLS: &str = include_str!("../assets/controls.js");
@@ -223,16 +224,48 @@ pub fn frames(caption: &str, frames: &[(String, ImageElement)]) -> Markup {
     html! {
         figure.frames {
             div.strip tabindex="0" role="region" aria-label=(caption) {
-                @for (label, image) in frames {
-                    div.frame data-label=(label) {
-                        (image.html(&format!("{caption}, {label}")))
-                        span { (label) }
-                    }
+                @for frame in frames {
+                    div.frame data-label=(frame.0) { (labelled(caption, frame)) }
                 }
             }
             figcaption { (caption) }
         }
     }
+}
+
+/// A picture of several in a figure, above its label.
+pub(crate) fn labelled(caption: &str, (label, image): &(String, ImageElement)) -> Markup {
+    html! {
+        (image.html(&format!("{caption}, {label}")))
+        span { (label) }
+    }
+}
+
+/// Pictures that lead to sections of the page: the name of a section, a picture with a text for those who cannot see it, a title, and a sentence
+/// in Markdown.
+pub(crate) fn gallery(cards: &[Card]) -> Markup {
+    html! {
+        ul.gallery {
+            @for card in cards {
+                li {
+                    a href={ "#" (card.section) } {
+                        (card.image.html(&card.alternative))
+                        span { (card.title) }
+                    }
+                    (markdown(&card.sentence))
+                }
+            }
+        }
+    }
+}
+
+/// One of a [`gallery`].
+pub(crate) struct Card {
+    pub section: String,
+    pub image: ImageElement,
+    pub alternative: String,
+    pub title: String,
+    pub sentence: String,
 }
 
 /// Every k-th item, with the smallest k that leaves at most `most` of them, which are two or more; the last one in any case.

@@ -15,7 +15,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::facts::{Facts, five_digits, natural};
 use crate::image::ImageElement;
-use crate::page::{Page, Section, figure};
+use crate::page::{Card, Page, Section, figure, gallery};
 use crate::table::TableElement;
 use crate::text::{linked, markdown, paragraph};
 
@@ -23,6 +23,8 @@ use crate::text::{linked, markdown, paragraph};
 const LONGEST_OPEN_TABLE: usize = 24;
 /// Longer CSV files are data and no tables to read.
 const LONGEST_CSV: usize = 60;
+/// Pixels a row of the pictures in the gallery, which stand in for larger ones.
+const GALLERY_WIDTH: usize = 400;
 /// More phases than these are too many to read.
 const MOST_PHASES: usize = 40;
 
@@ -45,7 +47,7 @@ static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
     lists.remove("experiment").expect("a test reads it")
 });
 
-/// The page of all experiments in a folder, in the paper's order after its `README.md`, and what is
+/// The page of all experiments in a folder, in the paper's order after a gallery of their first figures and its `README.md`, and what is
 /// missing or broken. Only a folder that cannot be read is an error.
 pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     let mut problems = Vec::new();
@@ -60,6 +62,10 @@ pub fn index_page(folder: &Path) -> Result<(Page, Vec<Error>)> {
     names.extend(found);
     let page = Page::new("Results of the Willmore flow workbench");
     let mut sections = Vec::new();
+    let cards: Vec<Card> = names.iter().filter_map(|name| card(folder, name)).collect();
+    if !cards.is_empty() {
+        sections.push(Section::new("Figures").with(gallery(&cards)));
+    }
     if let Some(text) = kept(read(folder, "README.md"), &mut problems) {
         let section = |target: &str| {
             let name = target.split('/').next()?;
@@ -85,22 +91,11 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
     let path = |file: &str| format!("{name}/{file}");
     let files = kept(entries(&root.join(name), false), problems).unwrap_or_default();
     let facts = kept(manifest(root, &path("manifest.json")), problems);
-    let entry = CATALOGUE.iter().find(|entry| entry.folder == name);
-    let title = entry.map_or_else(|| spelled_out(name), |entry| entry.title.clone());
-    let mut section = Section::new(title).named(name);
-    if let Some(entry) = entry {
+    let mut section = Section::new(title(name)).named(name);
+    if let Some(entry) = entry(name) {
         section.push(markdown(&entry.description));
     }
-    let known = entry.map_or(&[][..], |entry| &entry.figures).iter();
-    let known = known.map(|(stem, caption)| (format!("{stem}.png"), caption.clone()));
-    let mut pictures: Vec<(String, String)> = known.collect();
-    for file in &files {
-        let (stem, extension) = stem_and_extension(file);
-        if extension == "png" && pictures.iter().all(|(other, _)| other != file) {
-            pictures.push((file.clone(), format!("{}.", spelled_out(stem))));
-        }
-    }
-    for (file, caption) in pictures {
+    for (file, caption) in pictures(name, &files) {
         if !files.contains(&file) {
             problems.push(Error::Missing(path(&file)));
         } else if let Some(image) = kept(image(root, &path(&file)), problems) {
@@ -138,6 +133,45 @@ fn experiment(root: &Path, name: &str, problems: &mut Vec<Error>) -> Section {
         folded.push(Section::new("How it was computed").with(facts));
     }
     folded.into_iter().fold(section, Section::with)
+}
+
+/// The first figure of the experiment in the folder `root/name`, with a sentence that says what it is about and a link to its section. What is
+/// missing or broken is told there.
+fn card(root: &Path, name: &str) -> Option<Card> {
+    let files = entries(&root.join(name), false).ok()?;
+    let (file, caption) = pictures(name, &files).into_iter().next()?;
+    let file = format!("{name}/{file}");
+    let bytes = read_bytes(root, &file).ok()?;
+    Some(Card {
+        section: name.to_owned(),
+        image: ImageElement::reduced(&file, &bytes, GALLERY_WIDTH).ok()?,
+        title: title(name),
+        sentence: entry(name).map_or_else(|| caption.clone(), |entry| entry.description.clone()),
+        alternative: caption,
+    })
+}
+
+/// What the catalogue says of an experiment.
+fn entry(name: &str) -> Option<&'static Entry> {
+    CATALOGUE.iter().find(|entry| entry.folder == name)
+}
+
+fn title(name: &str) -> String {
+    entry(name).map_or_else(|| spelled_out(name), |entry| entry.title.clone())
+}
+
+/// The figures that an experiment must have, and others that are among its files, with their captions.
+fn pictures(name: &str, files: &[String]) -> Vec<(String, String)> {
+    let known = entry(name).map_or(&[][..], |entry| &entry.figures).iter();
+    let known = known.map(|(stem, caption)| (format!("{stem}.png"), caption.clone()));
+    let mut pictures: Vec<(String, String)> = known.collect();
+    for file in files {
+        let (stem, extension) = stem_and_extension(file);
+        if extension == "png" && pictures.iter().all(|(other, _)| other != file) {
+            pictures.push((file.clone(), format!("{}.", spelled_out(stem))));
+        }
+    }
+    pictures
 }
 
 /// What is there; otherwise a problem more.

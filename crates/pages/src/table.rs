@@ -4,7 +4,7 @@ use maud::{Markup, Render, html};
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
 use crate::error::{Error, Result};
-use crate::text::inline;
+use crate::text::{inline, unbroken};
 
 /// A table of text, its columns of numbers aligned right.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,7 +111,7 @@ impl TableElement {
         if self.marked {
             inline(text)
         } else {
-            html! { (text) }
+            html! { (unbroken(text)) }
         }
     }
 }
@@ -194,6 +194,13 @@ mod tests {
         assert_eq!(table.render().0, csv.render().0);
         assert_eq!(table.rows(), [["a", "1.5"], ["b", "–"]]);
         assert_eq!(csv.head(), ["method", "|F| \\"]);
+        for table in [
+            TableElement::from_csv("t", "seconds of all steps at n = 128\n1\n"),
+            TableElement::from_markdown("t", "| seconds of all steps at n = 128 |\n|---|\n| 1 |\n"),
+        ] {
+            let html = table.unwrap().render().0;
+            assert!(html.contains("n\u{a0}=\u{a0}128"), "{html}");
+        }
         let linked = "| a |\n|---|\n| [b](c.png) `d` |\n";
         let html = TableElement::from_markdown("t", linked).unwrap().render().0;
         assert!(html.contains("<td>b <code>d</code></td>"), "{html}");

@@ -65,6 +65,7 @@ fn events<'a>(
                     kept = true;
                 }
             }
+            Event::Text(text) => *text = unbroken(text).into(),
             Event::End(TagEnd::Link) => return kept.then_some(event),
             Event::Start(Tag::Heading { level, .. }) | Event::End(TagEnd::Heading(level)) => {
                 let below = HeadingLevel::try_from(*level as usize + 1);
@@ -74,6 +75,11 @@ fn events<'a>(
         }
         Some(event)
     })
+}
+
+/// A text in which no line ends beside a sign of equality, as in `n = 128`.
+pub(crate) fn unbroken(text: &str) -> String {
+    text.replace(" = ", "\u{a0}=\u{a0}")
 }
 
 #[cfg(test)]

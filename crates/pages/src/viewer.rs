@@ -1,5 +1,8 @@
 //! Surfaces to turn.
 
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+
 use geometry::measure::BoundingBox;
 use maud::{Markup, PreEscaped, html};
 use render::View;
@@ -7,17 +10,21 @@ use surfaces::TriangleMesh;
 
 use crate::error::Result;
 use crate::image::ImageElement;
+use crate::page::labelled;
 use crate::surface::Surface;
 
+/// Directions in which the outermost points are looked for.
+const DIRECTIONS: usize = 200;
+
 /// Surfaces, such as the steps of a flow, of which one is shown and can be turned: one or more with a label each, all seen in one scale
-/// and from one direction. A picture stands in for them until they are started, and wherever they cannot be: without JavaScript or WebGL,
-/// and on paper. Each surface must have a face, and [`View::check`] must accept the view.
+/// and from one direction, in which together they fill the view. Pictures with labels, side by side, stand in for them until they are started,
+/// and wherever they cannot be: without JavaScript or WebGL, and on paper. Each surface must have a face, and [`View::check`] must accept the view.
 ///
 /// Positions are rounded to 1/65535 of the bounding box. Where a mesh has no normals, they are
 /// those of the triangles around a vertex, weighted by area.
 pub fn viewer<'a>(
     caption: &str,
-    poster: &ImageElement,
+    pictures: &[(String, ImageElement)],
     view: View,
     surfaces: impl IntoIterator<Item = (&'a str, &'a TriangleMesh)>,
 ) -> Result<Markup> {
@@ -25,15 +32,20 @@ pub fn viewer<'a>(
     let (mut encoded, mut points) = (Vec::new(), Vec::new());
     for (label, mesh) in surfaces {
         encoded.push(Surface::new(label, mesh)?);
-        let corners = mesh.faces.as_flattened().iter();
-        points.extend(corners.map(|&vertex| mesh.vertices[vertex as usize]));
+        let corners: BTreeSet<u32> = mesh.faces.as_flattened().iter().copied().collect();
+        points.extend(corners.iter().map(|&vertex| mesh.vertices[vertex as usize]));
     }
     let (centre, radius) = ball(&points);
     Ok(html! {
         figure.viewer data-caption=(caption) data-up=(view.up.index())
             data-azimuth=(view.azimuth) data-elevation=(view.elevation)
-            data-centre=(listed(centre)) data-radius=(format!("{radius:e}")) {
-            div.stage { (poster.html(caption)) }
+            data-centre=(listed(centre)) data-radius=(format!("{radius:e}"))
+            data-outline=(outline(&points, centre, radius)) {
+            div.stage {
+                div.pictures {
+                    @for picture in pictures { div { (labelled(caption, picture)) } }
+                }
+            }
             // No script: a block of data, which browsers neither run nor show.
             @for surface in &encoded {
                 script type="text/plain" data-label=(surface.label) data-vertices=(surface.vertices)
@@ -63,6 +75,34 @@ fn ball(points: &[[f64; 3]]) -> ([f64; 3], f64) {
     (centre, if radius > 0.0 { radius } else { 1.0 })
 }
 
+/// The points that are outermost in some direction, seen from the centre in units of the radius: what fits into the view from all sides if these
+/// do, up to a percent.
+fn outline(points: &[[f64; 3]], centre: [f64; 3], radius: f64) -> String {
+    let outermost: BTreeSet<usize> = (0..DIRECTIONS)
+        .filter_map(|k| {
+            let direction = direction(k);
+            let far = |x: &[f64; 3]| (0..3).map(|i| direction[i] * x[i]).sum::<f64>();
+            let places = points.iter().map(far).enumerate();
+            let first = places.reduce(|a, b| if b.1 > a.1 { b } else { a });
+            Some(first?.0)
+        })
+        .collect();
+    let numbers = outermost
+        .iter()
+        .flat_map(|&k| (0..3).map(move |i| (points[k][i] - centre[i]) / radius));
+    let numbers: Vec<String> = numbers.map(|number| format!("{number:.4}")).collect();
+    numbers.join(" ")
+}
+
+/// Directions that are spread evenly, along a spiral from pole to pole.
+fn direction(k: usize) -> [f64; 3] {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let z = 1.0 - (2.0 * k as f64 + 1.0) / DIRECTIONS as f64;
+    let (sin, cos) = (golden * k as f64).sin_cos();
+    let across = (1.0 - z * z).sqrt();
+    [across * cos, across * sin, z]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +114,17 @@ mod tests {
         let points = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [2.0, 3.0, 0.0]];
         let (centre, radius) = ball(&points);
         assert_eq!(bits(centre, radius), bits([2.0, 1.5, 0.0], 2.5));
+        // Of many points those stay that are outermost somewhere.
+        let inner = points.map(|x| [1.0 + 0.5 * x[0], 0.5 + 0.5 * x[1], 0.0]);
+        let all = [points, inner].concat();
+        assert_eq!(
+            outline(&all, centre, radius),
+            outline(&points, centre, radius)
+        );
+        assert_eq!(
+            outline(&points, centre, radius),
+            "-0.8000 -0.6000 0.0000 0.8000 -0.6000 0.0000 0.0000 0.6000 0.0000"
+        );
         let (centre, radius) = ball(&[[3.0; 3]]);
         assert_eq!(bits(centre, radius), bits([3.0; 3], 1.0));
     }

@@ -37,7 +37,7 @@ fn page(text: &str) -> Page {
             .with(figure(&picture(), text))
             .with(TableElement::new(text, [text, "b"], [[text, "2"]]).unwrap())
             .with(frames(text, &pictures))
-            .with(viewer(text, &picture(), View::default(), surfaces).unwrap())
+            .with(viewer(text, &pictures[..1], View::default(), surfaces).unwrap())
             .with(inner),
     )
 }
@@ -172,7 +172,13 @@ fn viewers_turn_about_the_axis_that_points_up() {
             up,
             ..View::default()
         };
-        let html = viewer("ball", &picture(), view, [("0", &ball())]).unwrap();
+        let html = viewer(
+            "ball",
+            &[("0".to_owned(), picture())],
+            view,
+            [("0", &ball())],
+        )
+        .unwrap();
         assert!(html.0.contains(&format!("data-up=\"{}\"", up.index())));
     }
 }
@@ -184,6 +190,6 @@ fn views_that_cannot_be_are_refused() {
         elevation: 90.5,
         ..View::default()
     };
-    let error = viewer("ball", &picture(), view, [("0", &ball)]).unwrap_err();
+    let error = viewer("ball", &[("0".to_owned(), picture())], view, [("0", &ball)]).unwrap_err();
     assert!(matches!(error, Error::Render(_)), "{error}");
 }

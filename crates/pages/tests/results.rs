@@ -71,8 +71,22 @@ fn a_folder_becomes_a_section() {
     ] {
         assert!(html.contains(part), "{part}");
     }
+    // Before all text and tables the first figure of each experiment is a link to it.
+    let gallery = html.find("<ul class=\"gallery\">").unwrap();
+    assert!(gallery < html.find(">Beside the paper</h2>").unwrap());
+    let card = html[gallery..].split("</li>").next().unwrap();
+    for part in [
+        "<a href=\"#cross\"><img ",
+        "<span>Willmore flow of a cross</span></a>",
+        "<p>All methods against nested implicit finite elements on a finer grid.</p>",
+    ] {
+        assert!(card.contains(part), "{part}");
+    }
     // The shapes come first, and each table once.
-    assert!(html.find("The curve at").unwrap() < html.find("L² distance").unwrap());
+    assert!(
+        html.find("<figcaption>The curve at").unwrap()
+            < html.find("<figcaption>L² distance").unwrap()
+    );
     assert_eq!(html.matches("<caption>Error table</caption>").count(), 1);
     // Nothing says where the folder is.
     assert!(!html.contains(&*root.path().to_string_lossy()));

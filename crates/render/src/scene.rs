@@ -48,6 +48,8 @@ pub struct Scene {
     mesh: TriangleMesh,
     view: View,
     framed: Option<BoundingBox<3>>,
+    /// What is to fit into the picture besides, if nothing is framed.
+    beside: Vec<DVec3>,
     colour: Rgb,
     tubes: Vec<Tube>,
     /// A colour, and where it is: where the value at a vertex, interpolated, exceeds one half.
@@ -72,6 +74,7 @@ impl Scene {
             mesh,
             view: View::default(),
             framed: None,
+            beside: Vec::new(),
             colour: Rgb::CLAY,
             tubes: Vec::new(),
             highlight: None,
@@ -90,6 +93,13 @@ impl Scene {
     /// surface with its tubes.
     pub fn within(mut self, bounds: BoundingBox<3>) -> Self {
         self.framed = Some(bounds);
+        self
+    }
+
+    /// Lets the surface fill the picture together with other points, such as the vertices of a surface in another picture. A box around them
+    /// would leave its corners free.
+    pub fn beside(mut self, points: impl IntoIterator<Item = [f64; 3]>) -> Self {
+        self.beside.extend(points.into_iter().map(DVec3::from));
         self
     }
 
@@ -173,7 +183,16 @@ impl Scene {
     /// The camera, fitted to what is to fill the picture.
     fn camera(&self, model: &Model, size: [u32; 2]) -> Result<Camera, Error> {
         let points: Vec<DVec3> = match &self.framed {
-            None => model.vertices.iter().map(|vertex| vertex.place).collect(),
+            None => {
+                // Vertices of no triangle are not seen.
+                let mut seen = vec![false; model.vertices.len()];
+                for &corner in model.triangles.as_flattened() {
+                    seen[corner as usize] = true;
+                }
+                let own = model.vertices.iter().zip(seen).filter(|(_, seen)| *seen);
+                let own = own.map(|(vertex, _)| vertex.place);
+                own.chain(self.beside.iter().copied()).collect()
+            }
             Some(bounds) => {
                 for (low, extent) in bounds.lower.into_iter().zip(bounds.extent()) {
                     require("lower end of the framed box", low, "finite", |_| true)?;

@@ -116,6 +116,36 @@ fn a_shape_fills_its_picture() {
 }
 
 #[test]
+fn surfaces_beside_each_other_have_one_frame() {
+    let balls = [0.15, 0.3].map(|radius| ball([0.0; 3], radius));
+    let vertices = balls.map(|ball| {
+        let mesh = surfaces::phase_field_surface(&field(&ball), EPS);
+        mesh.unwrap().vertices
+    });
+    let areas = balls.each_ref().map(|ball| {
+        let scene = scene(ball).beside(vertices.concat());
+        silhouette(&scene.render([200; 2]).unwrap()).0
+    });
+    // The larger one fills it, and the smaller one stays half as wide.
+    let largest = PI / 4.0 * (0.96 * 200.0_f64).powi(2);
+    assert!((areas[1] / largest - 1.0).abs() < 0.02, "{areas:?}");
+    assert!((areas[0] / areas[1] - 0.25).abs() < 0.02, "{areas:?}");
+}
+
+#[test]
+fn vertices_of_no_triangle_take_no_room() {
+    let mut mesh = surfaces::phase_field_surface(&field(&ball([0.0; 3], 0.3)), EPS).unwrap();
+    mesh.normals = None;
+    let picture = |mesh: &TriangleMesh| {
+        let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);
+        scene.render([60; 2]).unwrap()
+    };
+    let before = picture(&mesh);
+    mesh.vertices.push([9.0; 3]);
+    assert_eq!(picture(&mesh), before);
+}
+
+#[test]
 fn the_outline_is_smooth() {
     let picture = scene(&ball([0.0; 3], 0.3)).render([120; 2]).unwrap();
     for (at, pixel) in picture.pixels().iter().enumerate() {

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! with a step $`v[u]`$ of mean curvature flow of the size $`\tilde\tau`$ and interfaces of the width $`\varepsilon`$ (Franken, Rumpf and Wirth;
-//! Rumpf, Sassen and Smoch).
+//! Rumpf, Sassen and Norden-Smoch).
 //!
 //! ```
 //! use geometry::{Grid, exact::willmore_radius, measure::l2_distance, phase_field, shapes::Ball};

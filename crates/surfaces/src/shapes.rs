@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use geometry::shapes::{Ball, Cross, Cuboid, Cylinder, Torus};
-use geometry::{SignedDistance, SignedDistanceExt};
+use geometry::{SignedDistance, SignedDistanceExt, UpAxis};
 
 use crate::{ClosedMesh, Error, samples};
 
@@ -101,8 +101,8 @@ pub enum BuiltIn {
     Plane(Box<dyn SignedDistance<2>>),
     /// In space.
     Space(Box<dyn SignedDistance<3>>),
-    /// A mesh that is yet to be placed.
-    Mesh(ClosedMesh),
+    /// A mesh that is yet to be placed, and the axis that points up in it.
+    Mesh(ClosedMesh, UpAxis),
 }
 
 /// The built-in shapes and whether they are in the plane.
@@ -153,7 +153,7 @@ pub fn built_in(name: &str, side: f64) -> Result<BuiltIn, Error> {
         "cube" => BuiltIn::Space(Box::new(Cuboid::new([half; 3])?)),
         "torus" => BuiltIn::Space(Box::new(Torus::new(0.72 * half, 0.28 * half)?)),
         "coin" => BuiltIn::Space(Box::new(Cylinder::new(half, 0.4 * half)?)),
-        "figure" => BuiltIn::Mesh(samples::figure(MESH_CELLS)?),
-        _ => BuiltIn::Mesh(samples::lever(MESH_CELLS)?),
+        "figure" => BuiltIn::Mesh(samples::figure(MESH_CELLS)?, UpAxis::Y),
+        _ => BuiltIn::Mesh(samples::lever(MESH_CELLS)?, UpAxis::Z),
     })
 }

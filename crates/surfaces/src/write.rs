@@ -4,8 +4,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 use files::write_atomically;
+use geometry::UpAxis;
 
-use crate::format::Format;
+use crate::format::{Format, up_line, usual_up_axis};
 use crate::vector::{Vector, scaled_normal};
 use crate::{Error, TriangleMesh};
 
@@ -22,7 +23,17 @@ use crate::{Error, TriangleMesh};
 /// [`Error::Io`] if the file cannot be written.
 pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
     let path = path.as_ref();
-    let bytes = encode(path, mesh)?;
+    write_with_up(path, mesh, usual_up_axis(path)?)
+}
+
+/// As [`write()`], with the axis that points up, which the file names in a comment unless it is the [usual one](usual_up_axis()) of the format:
+/// [`up_axis`](crate::up_axis()) finds it there. Coordinates stay what they are.
+///
+/// # Errors
+/// Those of [`write()`].
+pub fn write_with_up(path: impl AsRef<Path>, mesh: &TriangleMesh, up: UpAxis) -> Result<(), Error> {
+    let path = path.as_ref();
+    let bytes = encode_with_up(path, mesh, up)?;
     Ok(write_atomically(path, |out| out.write_all(&bytes))?)
 }
 
@@ -31,6 +42,19 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Error> {
 /// # Errors
 /// Those of [`write()`] but the last.
 pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Error> {
+    let path = path.as_ref();
+    encode_with_up(path, mesh, usual_up_axis(path)?)
+}
+
+/// The bytes that [`write_with_up()`] puts into a file of that name.
+///
+/// # Errors
+/// Those of [`write()`] but the last.
+pub fn encode_with_up(
+    path: impl AsRef<Path>,
+    mesh: &TriangleMesh,
+    up: UpAxis,
+) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
     let format = Format::of(path)?;
     mesh.check(match format {
@@ -44,10 +68,15 @@ pub fn encode(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<Vec<u8>, Er
     if faces == 0 {
         return Err(Error::NoFaces);
     }
+    let comment = if up == usual_up_axis(path)? {
+        String::new()
+    } else {
+        up_line(format, up)
+    };
     Ok(match format {
-        Format::Obj => obj(mesh).into_bytes(),
-        Format::Ply => ply(mesh),
-        Format::Stl => stl(mesh, faces),
+        Format::Obj => (comment + &obj(mesh)).into_bytes(),
+        Format::Ply => ply(&comment, mesh),
+        Format::Stl => stl(&comment, mesh, faces),
     })
 }
 
@@ -72,14 +101,14 @@ fn obj(mesh: &TriangleMesh) -> String {
     out
 }
 
-fn ply(mesh: &TriangleMesh) -> Vec<u8> {
+fn ply(comment: &str, mesh: &TriangleMesh) -> Vec<u8> {
     let axes: &[&str] = match mesh.normals {
         Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
         None => &["x", "y", "z"],
     };
     let properties = axes.iter().map(|axis| format!("property double {axis}\n"));
     let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{}element face {}\n\
+        "ply\nformat binary_little_endian 1.0\n{comment}element vertex {}\n{}element face {}\n\
          property list uchar uint vertex_indices\nend_header\n",
         mesh.vertices.len(),
         properties.collect::<String>(),
@@ -98,8 +127,9 @@ fn ply(mesh: &TriangleMesh) -> Vec<u8> {
     out
 }
 
-fn stl(mesh: &TriangleMesh, faces: u32) -> Vec<u8> {
-    let mut out = vec![0; 80];
+fn stl(comment: &str, mesh: &TriangleMesh, faces: u32) -> Vec<u8> {
+    let mut out = comment.as_bytes().to_vec();
+    out.resize(80, 0);
     out.extend(faces.to_le_bytes());
     for &face in &mesh.faces {
         // The normal is that of the rounded corners.

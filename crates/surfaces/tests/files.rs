@@ -8,7 +8,9 @@ use std::path::Path;
 use crate::common::files::{ENCODINGS, FACET, decode, encode, ply};
 use crate::common::{closed, cube, torus};
 use geometry::UpAxis;
-use surfaces::{ClosedMesh, Error, FormatError, TriangleMesh, read, samples, usual_up_axis, write};
+use surfaces::{
+    ClosedMesh, Error, FormatError, TriangleMesh, read, samples, up_axis, usual_up_axis, write,
+};
 
 fn problem(extension: &str, bytes: impl AsRef<[u8]>) -> FormatError {
     match decode(extension, bytes.as_ref()).unwrap_err() {
@@ -481,6 +483,36 @@ fn the_format_tells_which_axis_usually_points_up() {
         assert_eq!(usual_up_axis(path).unwrap(), up);
     }
     assert!(usual_up_axis("a.npy").is_err());
+}
+
+/// Its coordinates do not tell it: a mesh with y up lies on its side in a format that usually has z up, unless the file says so.
+#[test]
+fn a_file_names_the_axis_that_points_up_where_it_is_not_the_usual_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = samples::lever(48).unwrap().into_mesh();
+    for extension in ["obj", "ply", "stl"] {
+        let path = folder.path().join("mesh").with_extension(extension);
+        write(&path, &mesh).unwrap();
+        let (plain, usual) = (fs::read(&path).unwrap(), read(&path).unwrap());
+        for up in UpAxis::ALL {
+            surfaces::write_with_up(&path, &mesh, up).unwrap();
+            assert_eq!(up_axis(&path).unwrap(), up, "{extension}");
+            assert_eq!(read(&path).unwrap(), usual);
+            let is_usual = up == usual_up_axis(&path).unwrap();
+            let bytes = fs::read(&path).unwrap();
+            assert_eq!(bytes == plain, is_usual, "{extension} {up}");
+            // What the file says goes on with its vertices.
+            let moved = surfaces::rewrite(&bytes, &path, &usual).unwrap();
+            fs::write(&path, moved).unwrap();
+            assert_eq!(up_axis(&path).unwrap(), up, "{extension}");
+        }
+    }
+    // Others say other things there.
+    let path = folder.path().join("other.ply");
+    fs::write(&path, "ply\r\ncomment up and down\r\ncomment up x\r\n").unwrap();
+    assert_eq!(up_axis(&path).unwrap(), UpAxis::X);
+    fs::write(&path, "ply\ncomment UP\nend_header\ncomment up x\n").unwrap();
+    assert_eq!(up_axis(&path).unwrap(), UpAxis::Z);
 }
 
 #[test]

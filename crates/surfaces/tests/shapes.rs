@@ -47,13 +47,13 @@ fn built_in_shapes_have_the_side_that_is_asked_for() {
         let outside = match built_in(name, 0.8).unwrap() {
             BuiltIn::Plane(shape) => shape.signed_distance([0.4 + 0.1, 0.0]),
             BuiltIn::Space(shape) => shape.signed_distance([0.4 + 0.1, 0.0, 0.0]),
-            BuiltIn::Mesh(_) => panic!("{name} is a mesh"),
+            BuiltIn::Mesh(..) => panic!("{name} is a mesh"),
         };
         assert!((outside - 0.1).abs() < 1e-12, "{name}: {outside}");
     }
     // Meshes are placed later.
     for name in ["figure", "lever"] {
-        assert!(matches!(built_in(name, 0.8).unwrap(), BuiltIn::Mesh(_)));
+        assert!(matches!(built_in(name, 0.8).unwrap(), BuiltIn::Mesh(..)));
     }
     assert!(built_in("teapot", 0.8).is_err());
 }

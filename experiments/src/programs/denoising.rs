@@ -8,7 +8,7 @@ use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance, round
 use crate::surfaces::centred_box;
 use engine::DISPLACEMENT;
 use rand::{RngExt, SeedableRng};
-use surfaces::{Fairing, TAUBIN, samples, usual_up_axis};
+use surfaces::{Fairing, TAUBIN, samples, up_axis};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "denoising",
@@ -265,7 +265,7 @@ fn clean_meshes(options: &Options) -> Result<Vec<Clean>> {
         if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
             name.insert_str(0, "mesh_");
         }
-        meshes.push(Clean::new(&name, mesh, usual_up_axis(&path)?));
+        meshes.push(Clean::new(&name, mesh, up_axis(&path)?));
     }
     let names: BTreeSet<String> = meshes.iter().map(|clean| clean.key(0.0)).collect();
     let message = "two meshes have the same name, or that of a built-in one: rename a file";
