@@ -25,7 +25,10 @@ impl Standard {
         let Some(Paths { input, save, once }) = paths(command) else {
             return Ok(Self::default());
         };
-        let reads = input.input.as_deref() == Some("-");
+        let reads = input
+            .input
+            .as_ref()
+            .is_some_and(|input| input.name() == "-");
         let save = save.filter(|path| path.as_os_str() == "-");
         if !reads && save.is_none() {
             return Ok(Self::default());
@@ -45,7 +48,7 @@ impl Standard {
             }
             let path = place("input", kind(&bytes));
             std::fs::write(&path, &bytes).map_err(files::Error::of("write", &path))?;
-            input.input = Some(path.to_string_lossy().into_owned());
+            input.input = Some(path.as_path().into());
         }
         let mut output = None;
         if let Some(save) = save {
@@ -58,7 +61,10 @@ impl Standard {
             if let Some(once) = once {
                 *once = true;
             }
-            let format = jobs::usual_format(input.input.as_deref().unwrap_or_default())?;
+            let format = match &input.input {
+                Some(input) => jobs::usual_format(input)?,
+                None => return Err(jobs::Error::NoInput.into()),
+            };
             *save = place("output", &format);
             output = Some(save.clone());
         }

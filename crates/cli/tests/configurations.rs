@@ -6,6 +6,7 @@ use clap::CommandFactory;
 use fuzzing::{CountingAllocator, Fuzz, Limit, assert_short_line, peak_of};
 
 use jobs::settings::resolved;
+use jobs::{FairOptions, FlowOptions, InpaintOptions, McfOptions};
 
 use super::{LONGEST, parse_both, parse_resolved};
 use crate::cli::{Cli, Command, RunCommand};
@@ -95,6 +96,26 @@ fn resolved_configurations() {
         });
 }
 
+/// The defaults of the library are those of the program.
+#[test]
+fn defaults_are_those_of_the_library() {
+    let typed = |command: &str| {
+        let arguments = ["willmore", command, "a.ply"].map(Into::into);
+        let cli = crate::config::parse(&arguments);
+        text(&cli.unwrap()).unwrap()
+    };
+    for (of_library, name) in [
+        (jobs::Command::Flow(FlowOptions::of("a.ply")), "flow"),
+        (jobs::Command::Fair(FairOptions::of("a.ply")), "fair"),
+        (jobs::Command::Mcf(McfOptions::of("a.ply")), "mcf"),
+    ] {
+        assert_eq!(resolved(&of_library).unwrap(), typed(name));
+    }
+    let inpainting = jobs::Command::Inpaint(InpaintOptions::of("a.ply", "m.png"));
+    let masked = resolved(&inpainting).unwrap();
+    assert_eq!(masked.replace("mask = \"m.png\"\n", ""), typed("inpaint"));
+}
+
 /// Together with options that were typed.
 #[test]
 fn named_configurations() {
@@ -111,7 +132,8 @@ fn named_configurations() {
             let Command::Run(RunCommand::Flow(flow)) = &cli.command else {
                 panic!("{cli:?}");
             };
-            assert_eq!(flow.options.run.input.input.as_deref(), Some("a.ply"));
+            let input = flow.options.run.input.input.as_ref();
+            assert_eq!(input.map(jobs::Input::name), Some("a.ply"));
         });
 }
 

@@ -8,6 +8,8 @@ mod energies;
 mod examples;
 #[cfg(unix)]
 mod killed;
+mod library;
+mod messages;
 mod options;
 mod own;
 mod page;

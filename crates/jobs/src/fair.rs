@@ -1,5 +1,6 @@
 use std::f64::consts::PI;
 
+use crate::file::File;
 use crate::input::{Loaded, Source, closed};
 use crate::keep;
 use crate::options::FairOptions;
@@ -48,7 +49,7 @@ impl FairOptions {
         let mut reader = self.flow.run.reader(device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         let loaded = match reader.source.clone() {
-            Source::Mesh(path) => return self.load_mesh(&path, device, watcher),
+            Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
                 let given = self.noise.map_or("keep", |_| "noise");
                 let what = "a volume, of which a new mesh is made";
@@ -87,11 +88,11 @@ impl FairOptions {
 
     fn load_mesh(
         &mut self,
-        path: &Path,
+        file: &File,
         device: DeviceKind,
         watcher: &dyn Watcher,
     ) -> Result<Loaded> {
-        let repairs = self.flow.run.input.repair;
+        let (path, repairs) = (&file.path, self.flow.run.input.repair);
         if repairs && !self.remesh {
             refuse!(
                 "`repair` makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give `remesh`",
@@ -101,10 +102,10 @@ impl FairOptions {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
         }
         let bytes = if repairs {
-            let repaired = closed(path, true, watcher)?;
-            surfaces::encode_with_up(path, repaired.mesh(), surfaces::up_axis(path)?)?
+            let repaired = closed(file, true, watcher)?;
+            surfaces::encode_with_up(path, repaired.mesh(), file.up_axis()?)?
         } else {
-            files::read(path)?
+            file.read()?.into_owned()
         };
         let noise = self.noise.or(self.ends.then_some(0.0));
         let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
@@ -115,7 +116,7 @@ impl FairOptions {
         own.drives_volume = to_target || self.flow.reduced_volume.is_some();
         for change in changes {
             watcher.warning(&Warning::Mended {
-                path: path.to_owned(),
+                path: path.clone(),
                 change,
                 only_for_flow: !self.remesh,
             });
@@ -146,6 +147,6 @@ impl FairOptions {
         }
         let mut reader = self.flow.run.reader(device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
-        reader.own(own, path)
+        reader.own(own, file)
     }
 }

@@ -4,7 +4,7 @@ use render::View;
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 use surfaces::hausdorff_distance;
 
-use crate::paths::extension;
+use crate::made::{MeshFile, Surface, encoded};
 use crate::prelude::*;
 
 const PIXELS: u32 = 640;
@@ -16,8 +16,8 @@ const LOST: Rgb = OKABE_ITO[1];
 
 /// What became of a surface.
 pub struct Faired {
-    /// The extension and the bytes of a file with everything that the input had, unless the mesh is new.
-    pub file: Option<(String, Vec<u8>)>,
+    /// A file with everything that the input had, unless the mesh is new.
+    pub file: Option<MeshFile>,
     pub mesh: TriangleMesh,
     pub up: UpAxis,
     pub displacement: Figure,
@@ -40,13 +40,21 @@ impl Faired {
         })
     }
 
-    /// Writes a file: in the format of the input with everything that this had, in another one the triangles alone.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let same = |(format, _): &&(String, _)| extension(path) == *format;
-        if let Some((_, bytes)) = self.file.as_ref().filter(same) {
-            return Ok(files::write_atomically(path, |out| out.write_all(bytes))?);
+    /// The surface alone.
+    pub fn into_surface(self) -> Surface {
+        Surface {
+            mesh: self.mesh,
+            up: self.up,
+            file: self.file,
         }
-        Ok(surfaces::write_with_up(path, &self.mesh, self.up)?)
+    }
+
+    /// The bytes of a file: in the format of the input with everything that this had, in another one the triangles alone.
+    pub fn encode(&self, format: &str) -> Result<Vec<u8>> {
+        match &self.file {
+            Some(file) if file.format == format => Ok(file.bytes.clone()),
+            _ => encoded(&self.mesh, self.up, format),
+        }
     }
 }
 

@@ -4,13 +4,14 @@ use engine::{Flow, Storage};
 use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, Side, Tones};
-use surfaces::hausdorff_distance;
 use surfaces::shapes::{self, BuiltIn};
+use surfaces::{Repaired, hausdorff_distance};
 
 use crate::events::{GridDistance, Loss, ThinParts};
+use crate::file::{File, Input};
 use crate::options::{FieldKind, InputOptions, Inside};
 use crate::own::{OwnMesh, thinnest};
-use crate::paths::{absolute, extension};
+use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -55,10 +56,10 @@ pub fn open(options: &mut InputOptions, eps_over_h: f64, watcher: &dyn Watcher) 
 /// What an input is; the paths of files are absolute.
 #[derive(Clone)]
 pub enum Source {
-    Mesh(PathBuf),
-    Image(PathBuf),
-    Field(PathBuf),
-    Volume(PathBuf),
+    Mesh(File),
+    Image(File),
+    Field(File),
+    Volume(File),
     BuiltIn(String),
     Region(Region),
 }
@@ -99,21 +100,21 @@ const LARGEST_PHASE: f64 = 1.1;
 ///
 /// # Errors
 /// A text that is no input.
-pub fn usual_format(input: &str) -> Result<String> {
+pub fn usual_format(input: &Input) -> Result<String> {
     Ok(match Source::of(input)? {
-        Source::Mesh(path) => extension(&path),
+        Source::Mesh(file) => file.extension(),
         source if source.is_planar()? => "png".to_owned(),
         _ => "ply".to_owned(),
     })
 }
 
 /// The closed mesh in a file, possibly after a repair.
-pub fn closed(path: &Path, repairs: bool, watcher: &dyn Watcher) -> Result<ClosedMesh> {
-    let mesh = surfaces::read(path)?;
+pub fn closed(file: &File, repairs: bool, watcher: &dyn Watcher) -> Result<ClosedMesh> {
+    let (mesh, path) = (file.mesh()?, &file.path);
     if repairs {
         let repaired = surfaces::repair(&mesh, REPAIR_CELLS)?;
         watcher.warning(&Warning::Repaired {
-            path: path.to_owned(),
+            path: path.clone(),
             changes: repaired.changes,
         });
         return Ok(repaired.mesh);
@@ -121,7 +122,7 @@ pub fn closed(path: &Path, repairs: bool, watcher: &dyn Watcher) -> Result<Close
     let (mesh, changes) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
     for change in changes {
         watcher.warning(&Warning::Mended {
-            path: path.to_owned(),
+            path: path.clone(),
             change,
             only_for_flow: false,
         });
@@ -129,30 +130,45 @@ pub fn closed(path: &Path, repairs: bool, watcher: &dyn Watcher) -> Result<Close
     Ok(mesh)
 }
 
+/// A closed mesh of one that may bound nothing.
+pub fn repaired(input: &Input) -> Result<Repaired> {
+    match Source::of(input)? {
+        Source::Mesh(file) => Ok(surfaces::repair(&file.mesh()?, REPAIR_CELLS)?),
+        _ => refuse!("only meshes are repaired, and {input} is none"),
+    }
+}
+
 impl Source {
-    fn of(input: &str) -> Result<Self> {
-        if let Some(name) = input.strip_prefix("builtin:") {
-            return Ok(Self::BuiltIn(name.to_owned()));
+    fn of(input: &Input) -> Result<Self> {
+        let (name, contents) = (input.name(), input.contents());
+        if let (Some(built_in), None) = (name.strip_prefix("builtin:"), contents) {
+            return Ok(Self::BuiltIn(built_in.to_owned()));
         }
-        if Region::is_meant(input) {
-            return Ok(Self::Region(input.parse().map_err(Error::Options)?));
+        if contents.is_none() && Region::is_meant(name) {
+            return Ok(Self::Region(name.parse().map_err(Error::Options)?));
         }
-        let path = absolute(input)?;
-        Ok(match &*extension(&path) {
-            "obj" | "stl" | "ply" => Self::Mesh(path),
-            "tif" | "tiff" if volumes::is_stack(&path) => Self::Volume(path),
-            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(path),
-            "npy" => Self::Field(path),
-            "vti" => return Err(Error::ParaView(input.to_owned())),
-            "nii" | "gz" | "mrc" | "map" => Self::Volume(path),
-            _ => return Err(Error::UnknownInput(input.to_owned())),
+        let file = File {
+            path: match contents {
+                None => absolute(name)?,
+                Some(_) => name.into(),
+            },
+            contents: contents.cloned(),
+        };
+        Ok(match &*file.extension() {
+            "obj" | "stl" | "ply" => Self::Mesh(file),
+            "tif" | "tiff" if file.is_stack() => Self::Volume(file),
+            "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(file),
+            "npy" => Self::Field(file),
+            "vti" => return Err(Error::ParaView(name.to_owned())),
+            "nii" | "gz" | "mrc" | "map" => Self::Volume(file),
+            _ => return Err(Error::UnknownInput(name.to_owned())),
         })
     }
 
-    fn path(&self) -> Option<&Path> {
+    fn file(&self) -> Option<&File> {
         match self {
-            Self::Mesh(path) | Self::Image(path) | Self::Field(path) | Self::Volume(path) => {
-                Some(path)
+            Self::Mesh(file) | Self::Image(file) | Self::Field(file) | Self::Volume(file) => {
+                Some(file)
             }
             Self::BuiltIn(_) | Self::Region(_) => None,
         }
@@ -163,8 +179,8 @@ impl Source {
             Self::Mesh(_) | Self::Volume(_) => false,
             Self::Image(_) => true,
             // Whatever else is wrong with the file is said when its values are read.
-            Self::Field(path) => {
-                let decoded = npy::decode::<2>(&files::read(path)?);
+            Self::Field(file) => {
+                let decoded = npy::decode::<2>(&file.read()?);
                 !matches!(decoded, Err(NpyError::Rank { .. }))
             }
             Self::BuiltIn(name) => shapes::dimension(name)? == 2,
@@ -176,8 +192,8 @@ impl Source {
         let stem = match self {
             Self::BuiltIn(name) => name.into(),
             Self::Region(region) => region.name().into(),
-            file => {
-                let stem = file.path().and_then(Path::file_stem);
+            other => {
+                let stem = other.file().and_then(|file| file.path.file_stem());
                 stem.unwrap_or_default().to_string_lossy()
             }
         };
@@ -239,13 +255,13 @@ impl<'a> Reader<'a> {
         eps_over_h: f64,
         watcher: &'a dyn Watcher,
     ) -> Result<Self> {
-        let Some(input) = options.input.as_deref() else {
+        let Some(input) = &options.input else {
             return Err(Error::NoInput);
         };
         let source = Source::of(input)?;
         source.refuse_foreign(options)?;
-        if let Some(path) = source.path() {
-            options.input = Some(path.to_string_lossy().into_owned());
+        if let (Some(file), Some(input)) = (source.file(), &mut options.input) {
+            input.rename(&file.path);
         }
         Ok(Self {
             source,
@@ -261,14 +277,14 @@ impl<'a> Reader<'a> {
     pub fn load(&mut self) -> Result<Loaded> {
         let is_planar = self.source.is_planar()?;
         Ok(match self.source.clone() {
-            Source::Mesh(path) => {
-                let mesh = closed(&path, self.options.repair, self.watcher)?;
-                self.mesh(&mesh, surfaces::up_axis(&path)?)?
+            Source::Mesh(file) => {
+                let mesh = closed(&file, self.options.repair, self.watcher)?;
+                self.mesh(&mesh, file.up_axis()?)?
             }
-            Source::Image(path) => self.image(&path)?,
-            Source::Volume(path) => self.volume(&path)?,
-            Source::Field(path) if is_planar => Loaded::Plane(self.values(&path)?),
-            Source::Field(path) => Loaded::Space(self.values(&path)?),
+            Source::Image(file) => self.image(&file)?,
+            Source::Volume(file) => self.volume(&file)?,
+            Source::Field(file) if is_planar => Loaded::Plane(self.values(&file)?),
+            Source::Field(file) => Loaded::Space(self.values(&file)?),
             Source::Region(region) if is_planar => Loaded::Plane(self.shape(&*region.shape()?)?),
             Source::Region(region) => Loaded::Space(self.shape(&*region.shape()?)?),
             Source::BuiltIn(name) => self.built_in(&name)?,
@@ -449,7 +465,7 @@ impl<'a> Reader<'a> {
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
-    pub fn own(&mut self, own: OwnMesh, path: &Path) -> Result<Loaded> {
+    pub fn own(&mut self, own: OwnMesh, file: &File) -> Result<Loaded> {
         let (rough, start) = (own.rough(), &own.fairing().start);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let refuses = self.allows_loss != Some(true);
@@ -465,7 +481,7 @@ impl<'a> Reader<'a> {
         });
         let region = own.nodes(grid);
         let presentation = Space {
-            up: surfaces::up_axis(path)?,
+            up: file.up_axis()?,
             input: Some(Topology::of(rough)),
             own: Some(own),
             ..Space::default()
@@ -512,7 +528,8 @@ impl<'a> Reader<'a> {
         presentation: O,
     ) -> Result<InitialShape<D, O>> {
         let initial: Stored<D> = initial.into();
-        check_phases(&initial, self.options.input.as_deref().unwrap_or_default())?;
+        let input = self.options.input.as_ref();
+        check_phases(&initial, input.map_or("", Input::name))?;
         let label = self.options.label;
         let label = label.map_or(String::new(), |label| format!("-label{label}"));
         Ok(InitialShape {
@@ -549,8 +566,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn image(&mut self, path: &Path) -> Result<Loaded> {
-        let image = images::read(path)?;
+    fn image(&mut self, file: &File) -> Result<Loaded> {
+        let image = file.image()?;
         let threshold = self.options.threshold.unwrap_or(0.5);
         let usual = Side::of(&image, threshold)?;
         let side = match self.options.inside {
@@ -558,12 +575,12 @@ impl<'a> Reader<'a> {
             Some(Inside::Dark) => Side::Dark(threshold),
             Some(Inside::Light) => Side::Light(threshold),
         };
-        let plane = Plane::of_image(&image, path)?;
+        let plane = Plane::of_image(&image, file)?;
         let tones = Tones::of(&image, side);
         let is_said = self.options.inside.is_some() || self.options.threshold.is_some();
         if tones.between >= PHOTOGRAPH && !is_said {
             return Err(Error::Photograph {
-                path: path.to_owned(),
+                path: file.path.clone(),
                 between: tones.between,
                 threshold: tones.threshold,
                 side: side.at(tones.threshold).to_string(),
@@ -578,8 +595,8 @@ impl<'a> Reader<'a> {
         Ok(Loaded::Plane(self.start(field, plane)?))
     }
 
-    fn volume(&mut self, path: &Path) -> Result<Loaded> {
-        let body = volume::body(path, self.options)?;
+    fn volume(&mut self, file: &File) -> Result<Loaded> {
+        let body = volume::body(file, self.options)?;
         let bounds = body.surface.bounding_box();
         let distance = MeshDistance::new(&body.surface);
         let sides = body.surface.mesh().sides(MOST_RAYS);
@@ -631,16 +648,21 @@ impl<'a> Reader<'a> {
 
     fn values<const D: usize, O: Presentation<D>>(
         &mut self,
-        path: &Path,
+        file: &File,
     ) -> Result<InitialShape<D, O>> {
         let kind = *self.options.field_kind.get_or_insert(FieldKind::PhaseField);
         let is_phase = kind == FieldKind::PhaseField;
         let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
-        let mut field = npy::read(path, |cells| Grid::centred(cells, side))?;
+        let decoded = npy::decode::<D>(&file.read()?);
+        let (cells, values) = decoded.map_err(|source| geometry::Error::Npy {
+            path: file.path.clone(),
+            source,
+        })?;
+        let mut field = Field::from_values(Grid::centred(cells, side)?, values)?;
         let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
         if let (true, Some(value)) = (is_phase, outside) {
             return Err(Error::NoPhase {
-                path: path.to_owned(),
+                path: file.path.clone(),
                 value: *value,
             });
         }

@@ -5,6 +5,7 @@ use engine::{Flow, Storage, Store};
 use crate::case::with_round_edges;
 use crate::command::Command;
 use crate::input::{InitialShape, Loaded, Reader};
+use crate::made::{Made, Results};
 use crate::options::{ForceOption, McfOptions, RunOptions};
 use crate::outcome::Outcome;
 use crate::paths::absolute;
@@ -92,32 +93,31 @@ impl RunOptions {
 ///
 /// # Errors
 /// Refused options or input; whatever stops a flow. [`Error::Interrupted`] is none of them: an interrupted run is an outcome without a summary.
-pub fn start(mut command: Command, watcher: &dyn Watcher) -> Result<Outcome> {
-    command.check()?;
-    let steps = command.usual_steps();
-    command.options().steps.get_or_insert(steps);
-    let mut job = Job::new(command, watcher)?;
-    let kind = job.device.kind();
-    let loaded = match &mut job.command {
-        Command::Fair(fair) => fair.load(kind, watcher),
-        Command::Inpaint(inpaint) => inpaint.load(kind, watcher),
-        Command::Mcf(mcf) => {
-            let mut reader = mcf.run.reader(kind, watcher)?;
-            reader.whole = Some((kind, Flow::MeanCurvature));
-            reader.load()
-        }
-        Command::Flow(flow) => flow.run.reader(kind, watcher)?.load(),
-    };
-    match loaded? {
+pub fn run_in_folder(command: Command, watcher: &dyn Watcher) -> Result<Outcome> {
+    let (job, loaded) = Job::load(command, watcher)?;
+    match loaded {
         Loaded::Plane(start) => job.start(start),
         Loaded::Space(start) => job.start(start),
     }
 }
 
+/// Makes a run in memory. Nothing is written: options of files are ignored.
+///
+/// # Errors
+/// Refused options or input; whatever stops a flow; [`Error::Interrupted`].
+pub fn run_in_memory(mut command: Command, watcher: &dyn Watcher) -> Result<Results> {
+    command.options().save = None;
+    let (job, loaded) = Job::load(command, watcher)?;
+    Ok(match loaded {
+        Loaded::Plane(start) => Results::Plane(job.make(start)?),
+        Loaded::Space(start) => Results::Space(job.make(start)?),
+    })
+}
+
 /// Continues a stored run, perhaps to more steps, with the options that it [was started with](settings::stored).
 ///
 /// # Errors
-/// As [`start`], and for folders that hold no such run.
+/// As [`run_in_folder`], and for folders that hold no such run.
 pub fn resume(
     mut command: Command,
     stored: StoredRun,
@@ -165,30 +165,58 @@ impl<'a> Job<'a> {
         })
     }
 
-    fn start<const D: usize, O: Presentation<D>>(
-        mut self,
+    /// Reads the input.
+    fn load(mut command: Command, watcher: &'a dyn Watcher) -> Result<(Self, Loaded)> {
+        command.check()?;
+        let steps = command.usual_steps();
+        command.options().steps.get_or_insert(steps);
+        let mut job = Self::new(command, watcher)?;
+        let kind = job.device.kind();
+        let loaded = match &mut job.command {
+            Command::Fair(fair) => fair.load(kind, watcher),
+            Command::Inpaint(inpaint) => inpaint.load(kind, watcher),
+            Command::Mcf(mcf) => {
+                let mut reader = mcf.run.reader(kind, watcher)?;
+                reader.whole = Some((kind, Flow::MeanCurvature));
+                reader.load()
+            }
+            Command::Flow(flow) => flow.run.reader(kind, watcher)?.load(),
+        };
+        Ok((job, loaded?))
+    }
+
+    /// The flow from a shape.
+    fn prepare<const D: usize, O: Presentation<D>>(
+        &mut self,
         mut start: InitialShape<D, O>,
-    ) -> Result<Outcome> {
-        let options = self.command.options();
-        start.presentation.turn(&mut options.up)?;
-        options.save.as_deref().map_or(Ok(()), O::check_saved)?;
+    ) -> Result<(Case<D>, O)> {
+        start.presentation.turn(&mut self.command.options().up)?;
         if let Some(options) = self.command.willmore() {
             options.check_sizes::<D>(self.watcher)?;
         }
         if let Command::Flow(options) = &mut self.command {
             with_round_edges(options, &mut start.initial, &self.device, self.watcher)?;
         }
-        let (case, presentation) = self.command.case(start)?;
-        // The options of which the same run can be made again.
-        let mut noted = self.command.clone();
-        if noted.options().saves_once {
-            noted.options().save = None;
-        }
-        // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
-        if matches!(&noted, Command::Fair(fair) if !fair.ends) {
-            noted.options().steps = None;
-        }
-        let options = settings::resolved(&noted)?;
+        self.command.case(start)
+    }
+
+    fn make<const D: usize, O: Presentation<D>>(
+        mut self,
+        start: InitialShape<D, O>,
+    ) -> Result<Made<D>> {
+        let (case, presentation) = self.prepare(start)?;
+        let run = Run::new(case, &self.device)?;
+        self.plan(presentation).make(run)
+    }
+
+    fn start<const D: usize, O: Presentation<D>>(
+        mut self,
+        start: InitialShape<D, O>,
+    ) -> Result<Outcome> {
+        let save = self.command.options().save.as_deref();
+        save.map_or(Ok(()), O::check_saved)?;
+        let (case, presentation) = self.prepare(start)?;
+        let options = self.options_to_store()?;
         let plan = self.plan(presentation);
         let notes = plan.notes(&case, &self.device);
         let run = Run::new(case, &self.device)?;
@@ -204,6 +232,19 @@ impl<'a> Job<'a> {
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
         plan.go_on(store, run)
+    }
+
+    /// The options of which the same run can be made again.
+    fn options_to_store(&self) -> Result<String> {
+        let mut noted = self.command.clone();
+        if noted.options().saves_once {
+            noted.options().save = None;
+        }
+        // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
+        if matches!(&noted, Command::Fair(fair) if !fair.ends) {
+            noted.options().steps = None;
+        }
+        settings::resolved(&noted)
     }
 
     /// Continues a run from its last checkpoint, a finished one to more steps.

@@ -2,22 +2,23 @@
 //! results.
 //!
 //! ```
-//! use jobs::{Command, FlowOptions, InputOptions, RunOptions, Silent};
+//! use jobs::{FlowOptions, Silent};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let folder = tempfile::tempdir()?;
-//! let run = RunOptions {
-//!     input: InputOptions { input: Some("builtin:cross".to_owned()), cells: Some(24), ..InputOptions::default() },
-//!     steps: Some(2),
-//!     output: Some(folder.path().join("cross")),
-//!     ..RunOptions::default()
-//! };
-//! let outcome = jobs::start(Command::Flow(FlowOptions { run, ..FlowOptions::default() }), &Silent)?;
-//! let summary = outcome.summary.expect("nothing interrupted it");
+//! let mut options = FlowOptions::of("builtin:cross");
+//! options.run.input.cells = Some(24);
+//! options.run.steps = Some(2);
+//! let results = jobs::flow(options, &Silent)?;
+//! let summary = results.summary();
 //! assert!(summary.energy < summary.first_energy);
+//! let shape = results.shape().expect("two steps leave a shape");
+//! assert!(shape.encode("svg")?.starts_with(b"<svg"));
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a
+//! run in a folder, with pictures and a page, and [`resume`] continues it. [`open`] is the way from an input to a phase field on a good grid.
 //!
 //! Nothing is printed. A [`Watcher`] hears [warnings](Warning) and [notes](Note) as values with their numbers, follows the progress, and can interrupt.
 //! Messages name options in backticks, as `cells`: a program can show them as it spells them.
@@ -28,10 +29,13 @@ mod error;
 mod events;
 mod fair;
 mod faired;
+mod file;
+mod functions;
 mod inpaint;
 mod input;
 mod job;
 mod keep;
+mod made;
 mod options;
 mod outcome;
 mod own;
@@ -53,8 +57,11 @@ pub use command::Command;
 pub use error::{Error, Result};
 pub use events::{GridDistance, Loss, Note, Progress, Silent, ThinParts, Warning, Watcher};
 pub use faired::MeshReport;
+pub use file::Input;
+pub use functions::{LabelSurface, fair, flow, inpaint, mcf, repair, surfaces_of_labels};
 pub use input::{Opened, open, usual_format};
-pub use job::{resume, start};
+pub use job::{resume, run_in_folder, run_in_memory};
+pub use made::{Curve, Made, MeshFile, Results, Shape, Surface};
 pub use options::{
     CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions, InputOptions,
     Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions,

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use engine::Storage;
 
+use crate::file::Input;
 use crate::paths::MESHES;
 use crate::prelude::*;
 use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
@@ -24,7 +25,7 @@ pub struct InputOptions {
     /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume of voxels (.nii, .nii.gz, .mrc, .map, and .tif
     /// of several pages), a field (.npy), builtin:NAME with NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure,
     /// lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z, or - for standard input
-    pub input: Option<String>,
+    pub input: Option<Input>,
 
     /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; those of a field; for a mesh, image or volume the coarsest of a few that
     /// holds its thin parts]
@@ -84,7 +85,7 @@ pub enum FieldKind {
 }
 
 /// Which operator, at which scales.
-#[derive(Args, Serialize, Clone, Debug, Default)]
+#[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct OperatorOptions {
     /// Interface width in cells [default: 2, or that of --network]
@@ -119,6 +120,17 @@ pub struct OperatorOptions {
         hide_short_help = true
     )]
     pub storage: Option<Storage>,
+}
+
+impl Default for OperatorOptions {
+    fn default() -> Self {
+        Self {
+            eps_over_h: None,
+            formulation: Formulation::Accurate,
+            network: None,
+            storage: None,
+        }
+    }
 }
 
 /// What is there stays, unless this is given.
@@ -412,4 +424,81 @@ pub struct SampleOptions {
     /// Whether files are written over.
     #[command(flatten)]
     pub force: ForceOption,
+}
+
+impl InputOptions {
+    /// Of this input, with all that is left to it.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            input: Some(input.into()),
+            ..Self::default()
+        }
+    }
+}
+
+impl RunOptions {
+    /// Of this input, with the defaults of the program.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            input: InputOptions::of(input),
+            ..Self::default()
+        }
+    }
+}
+
+impl FlowOptions {
+    /// Of this input, with the defaults of the program.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            run: RunOptions::of(input),
+            ..Self::default()
+        }
+    }
+}
+
+impl FairOptions {
+    /// Of this mesh or segmentation, with the defaults of the program.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            flow: FlowOptions::of(input),
+            ..Self::default()
+        }
+    }
+}
+
+impl InpaintOptions {
+    /// Of this input and the region in it that is filled, with the defaults of the program.
+    pub fn of(input: impl Into<Input>, mask: impl Into<String>) -> Self {
+        Self {
+            flow: FlowOptions::of(input),
+            mask: Some(mask.into()),
+            ..Self::default()
+        }
+    }
+}
+
+impl McfOptions {
+    /// Of this input, by the network, with the defaults of the program.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            method: Method::Hybrid,
+            run: RunOptions::of(input),
+        }
+    }
+}
+
+impl SampleOptions {
+    /// Of this input, to this file, as it is.
+    pub fn of(input: impl Into<Input>, save: impl Into<PathBuf>) -> Self {
+        Self {
+            input: InputOptions::of(input),
+            save: save.into(),
+            without: Vec::new(),
+            noise: 0.0,
+            seed: 1,
+            resample: false,
+            up: None,
+            force: ForceOption::default(),
+        }
+    }
 }

@@ -7,6 +7,7 @@ use surfaces::Followed;
 
 use crate::faired::{Faired, MeshReport, figure, surface};
 use crate::keep;
+use crate::made::MeshFile;
 use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::Known;
@@ -243,10 +244,10 @@ impl OwnMesh {
             ..MeshReport::new(rough, &moved, &lengths)
         };
         Ok(Faired {
-            file: Some((
-                self.extension().to_owned(),
-                surfaces::rewrite(bytes, &self.file, &all)?,
-            )),
+            file: Some(MeshFile {
+                format: self.extension().to_owned(),
+                bytes: surfaces::rewrite(bytes, &self.file, &all)?,
+            }),
             displacement: figure(&moved, &lengths, &lost, up)?,
             mesh: all,
             up,

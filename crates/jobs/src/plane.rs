@@ -3,7 +3,9 @@
 use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
-use crate::paths::extension;
+use crate::faired::Faired;
+use crate::file::File;
+use crate::made::{Curve, Shape};
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
 
@@ -21,7 +23,7 @@ pub struct Plane {
     original: Option<Original>,
     /// The input, if it is an image, which a mask has to fit.
     #[serde(skip)]
-    image: Option<PathBuf>,
+    image: Option<File>,
 }
 
 struct Original {
@@ -32,13 +34,19 @@ struct Original {
 
 impl Plane {
     /// The frame has the pixels of the image.
-    pub fn of_image(image: &Image, path: &Path) -> Result<Self> {
+    pub fn of_image(image: &Image, file: &File) -> Result<Self> {
         let [_, height] = image.size();
         Ok(Self {
             frame: Frame::new(image.size(), [0.0, f64::from(height)], 1.0)?,
             original: None,
-            image: Some(path.to_owned()),
+            image: Some(file.clone()),
         })
+    }
+
+    /// The outline as the text of an SVG file.
+    fn drawing(&self, u: &Stored<2>) -> Result<String> {
+        let outline = Outline::of_phase_field(&u.field()?)?;
+        Ok(images::svg(&self.frame, &outline))
     }
 
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
@@ -66,10 +74,10 @@ impl Plane {
 
     /// From now on in the tones of the input, if it is an image, all of whose pixels outside of a mask stay.
     pub fn repair(&mut self, mask: &dyn SignedDistance<2>, watcher: &dyn Watcher) -> Result<()> {
-        let Some(path) = &self.image else {
+        let Some(file) = &self.image else {
             return Ok(());
         };
-        let bytes = files::read(path)?;
+        let (path, bytes) = (&file.path, file.read()?);
         let picture = images::colours(path, &bytes)?;
         if images::is_deep(&bytes) {
             watcher.warning(&Warning::Deep { path: path.clone() });
@@ -174,13 +182,18 @@ impl Presentation<2> for Plane {
         })
     }
 
-    fn save(&self, u: &Stored<2>, eps: f64, path: &Path) -> Result<()> {
-        if extension(path) != "svg" {
-            return Ok(self.picture(u, u, eps)?.write_png(path)?);
+    fn encode(&self, u: &Stored<2>, eps: f64, format: &str) -> Result<Vec<u8>> {
+        match format {
+            "svg" => Ok(self.drawing(u)?.into_bytes()),
+            _ => Ok(self.picture(u, u, eps)?.to_png()?),
         }
-        let text = images::svg(&self.frame, &Outline::of_phase_field(&u.field()?)?);
-        let written = files::write_atomically(path, |out| out.write_all(text.as_bytes()));
-        Ok(written?)
+    }
+
+    fn shape(&self, u: &Stored<2>, eps: f64, _: Option<Faired>) -> Result<Shape> {
+        Ok(Shape::Curve(Curve {
+            picture: self.picture(u, u, eps)?,
+            svg: self.drawing(u)?,
+        }))
     }
 
     fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {

@@ -7,6 +7,7 @@ use engine::{METRICS, TIMINGS};
 use serde::de::DeserializeOwned;
 
 use crate::faired::Faired;
+use crate::made::Shape;
 use crate::paths::extension;
 use crate::prelude::*;
 
@@ -102,8 +103,11 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
         Ok(())
     }
 
-    /// Writes the shape to any such file.
-    fn save(&self, u: &Stored<D>, eps: f64, path: &Path) -> Result<()>;
+    /// The bytes of a file with the shape, in one of these formats.
+    fn encode(&self, u: &Stored<D>, eps: f64, format: &str) -> Result<Vec<u8>>;
+
+    /// The shape without its grid; `faired` is what became of a surface.
+    fn shape(&self, u: &Stored<D>, eps: f64, faired: Option<Faired>) -> Result<Shape>;
 
     /// What becomes of a surface, and how far it has gone.
     fn faired(&self, _: &Stored<D>, _: &Stored<D>, _: f64) -> Result<Option<Faired>> {

@@ -12,9 +12,12 @@ use solver::StepEstimates;
 
 use crate::events::Progress;
 use crate::faired::{Faired, MeshReport};
+use crate::file::Input;
+use crate::made::Made;
 use crate::options::{InputOptions, RunOptions};
 use crate::outcome::{GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
 use crate::page;
+use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation, Topology};
 
@@ -57,28 +60,12 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
 
     /// From the last checkpoint to the end.
     pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<Outcome> {
-        let interrupt = self.watcher.interrupt()?;
-        let stored = run.stored_cells();
-        self.watcher.note(&Note::Storage {
-            part: stored as f64 / run.case().grid().len() as f64,
-            bytes: run.case().bytes(stored),
-        });
         let folder = store.directory().path().to_owned();
-        let title = format!("{} of {}", self.command, run.case().shape);
-        let progress = self
-            .watcher
-            .begins(&title, self.options.steps.unwrap_or(0) as u64);
         let clock = Instant::now();
-        let mut steps = Steps(&*progress);
-        let mut pictures = Pictures {
-            plan: self,
-            topology: None,
-        };
-        let observers: &mut [&mut dyn Observer<D>] = &mut [&mut steps, &mut pictures];
-        let ended = run.advance(Some(&mut store), observers, &interrupt)?;
+        let ended = self.advance(Some(&mut store), &mut run)?;
         let seconds = clock.elapsed().as_secs_f64();
         let mut summary = None;
-        if ended.is_some() {
+        if ended {
             summary = Some(self.finish(store, &run)?);
         } else {
             drop(store);
@@ -98,6 +85,48 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             save: self.options.save.clone(),
             seconds,
         })
+    }
+
+    /// From the beginning to the end, in memory.
+    pub fn make(&self, mut run: Run<D>) -> Result<Made<D>> {
+        if !self.advance(None, &mut run)? {
+            return Err(Error::Interrupted);
+        }
+        let (u, eps) = (run.stored(), run.case().scales.eps);
+        let (mut mesh, mut topology, mut shape) = (None, Topology::default(), None);
+        if has_interface(u) {
+            let faired = self.presentation.faired(&run.case().initial, u, eps)?;
+            mesh = faired.as_ref().map(|faired| faired.report.clone());
+            topology = self.presentation.topology(u, eps)?;
+            shape = Some(self.presentation.shape(u, eps, faired)?);
+        }
+        Ok(Made {
+            summary: self.summary(&run, topology, mesh),
+            ended: run.ended(),
+            records: run.records().to_vec(),
+            field: u.clone(),
+            shape,
+        })
+    }
+
+    /// Makes the steps, and says whether the run is over and was not interrupted.
+    fn advance(&self, store: Option<&mut Store>, run: &mut Run<D>) -> Result<bool> {
+        let interrupt = self.watcher.interrupt()?;
+        let stored = run.stored_cells();
+        self.watcher.note(&Note::Storage {
+            part: stored as f64 / run.case().grid().len() as f64,
+            bytes: run.case().bytes(stored),
+        });
+        let title = format!("{} of {}", self.command, run.case().shape);
+        let steps = self.options.steps.unwrap_or(0);
+        let progress = self.watcher.begins(&title, steps as u64);
+        let mut steps = Steps(&*progress);
+        let mut pictures = Pictures {
+            plan: self,
+            topology: None,
+        };
+        let observers: &mut [&mut dyn Observer<D>] = &mut [&mut steps, &mut pictures];
+        Ok(run.advance(store, observers, &interrupt)?.is_some())
     }
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Summary> {
@@ -224,10 +253,12 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
 
     /// Writes the shape, or what became of the surface that it was, to a file.
     fn save(&self, u: &Stored<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
-        match faired {
-            Some(faired) => faired.write(path),
-            None => self.presentation.save(u, eps, path),
-        }
+        let format = extension(path);
+        let bytes = match faired {
+            Some(faired) => faired.encode(&format)?,
+            None => self.presentation.encode(u, eps, &format)?,
+        };
+        Ok(files::write_atomically(path, |out| out.write_all(&bytes))?)
     }
 }
 
@@ -282,25 +313,24 @@ struct Pictures<'a, const D: usize, O> {
 
 impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
     fn observe(&mut self, event: &mut Event<'_, D>) -> Result<(), engine::Error> {
-        let (Some(step), Some(run)) = (event.step(), event.directory.as_deref_mut()) else {
+        // An inpainted region may have been all of the shape.
+        let (Some(step), true) = (event.step(), has_interface(event.run.stored())) else {
             return Ok(());
         };
-        // An inpainted region may have been all of the shape.
-        if !has_interface(event.run.stored()) {
-            return Ok(());
-        }
         let (case, u, plan) = (event.run.case(), event.run.stored(), self.plan);
         let eps = case.scales.eps;
         let failed = |error: Error| engine::Error::Observer(error.into());
-        if step == 0 {
-            let written = plan.write_shape(u, eps, None, presentation::START, run);
-            written.map_err(failed)?;
-        }
         let frames = plan.options.frames;
-        if frames.is_some_and(|every| step.is_multiple_of(every)) {
-            let name = presentation::frame(step);
-            let written = plan.write(event.run, None, &name, run);
-            written.map_err(failed)?;
+        if let Some(directory) = event.directory.as_deref_mut() {
+            if step == 0 {
+                let written = plan.write_shape(u, eps, None, presentation::START, directory);
+                written.map_err(failed)?;
+            }
+            if frames.is_some_and(|every| step.is_multiple_of(every)) {
+                let name = presentation::frame(step);
+                let written = plan.write(event.run, None, &name, directory);
+                written.map_err(failed)?;
+            }
         }
         // Touching sheets have no topology.
         let topology = plan.presentation.topology(u, eps).ok();
@@ -329,7 +359,7 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
         Err(_) => return Ok(()),
     };
     let whole = |path: &Path| path.canonicalize().ok();
-    if let (Some(input), Some(folder)) = (input.input.as_deref(), whole(folder))
+    if let (Some(input), Some(folder)) = (input.input.as_ref().map(Input::name), whole(folder))
         && whole(Path::new(input)).is_some_and(|input| input.starts_with(folder))
     {
         return Err(Error::InputInTheRun(input.to_owned()));

@@ -34,14 +34,14 @@ pub fn sample(mut options: SampleOptions, watcher: &dyn Watcher) -> Result<()> {
         let mut mesh = if repairs {
             closed(from, true, watcher)?.into_mesh()
         } else {
-            surfaces::read(from)?
+            from.mesh()?
         };
         if noise > 0.0 {
             // Those in the file may not be outward.
             mesh.normals = None;
             mesh.roughen(noise, options.seed);
         }
-        let up = options.up.map_or_else(|| surfaces::up_axis(from), Ok)?;
+        let up = options.up.map_or_else(|| from.up_axis(), Ok)?;
         return Ok(surfaces::write_with_up(&path, &mesh, up)?);
     }
     match reader.load()? {
@@ -92,7 +92,8 @@ fn write<const D: usize, O: Presentation<D>>(
     start.presentation.turn(&mut options.up)?;
     let u = without(start.initial.field()?, &options.without)?;
     let eps = eps(&u);
-    match &*extension(path) {
+    let format = &*extension(path);
+    match format {
         "npy" => npy::write(path, &u)?,
         "nii" | "gz" => volumes::write(path, &segmentation(&u, path)?)?,
         "vti" => vti::write(path, "phase_field", &u)?,
@@ -103,7 +104,8 @@ fn write<const D: usize, O: Presentation<D>>(
         }
         _ => {
             O::check_saved(path)?;
-            start.presentation.save(&u.into(), eps, path)?;
+            let bytes = start.presentation.encode(&u.into(), eps, format)?;
+            files::write_atomically(path, |out| out.write_all(&bytes))?;
         }
     }
     Ok(())

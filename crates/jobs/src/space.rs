@@ -4,6 +4,7 @@ use geometry::measure::bounding_box;
 use render::View;
 
 use crate::faired::{Faired, surface};
+use crate::made::{Shape, Surface, encoded};
 use crate::own::OwnMesh;
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -81,8 +82,19 @@ impl Presentation<3> for Space {
         Ok(Topology::of(&closed))
     }
 
-    fn save(&self, u: &Stored<3>, eps: f64, path: &Path) -> Result<()> {
-        Ok(surfaces::write_with_up(path, &surface(u, eps)?, self.up)?)
+    fn encode(&self, u: &Stored<3>, eps: f64, format: &str) -> Result<Vec<u8>> {
+        encoded(&surface(u, eps)?, self.up, format)
+    }
+
+    fn shape(&self, u: &Stored<3>, eps: f64, faired: Option<Faired>) -> Result<Shape> {
+        Ok(Shape::Surface(match faired {
+            Some(faired) => faired.into_surface(),
+            None => Surface {
+                mesh: surface(u, eps)?,
+                up: self.up,
+                file: None,
+            },
+        }))
     }
 
     fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64) -> Result<Option<Faired>> {

@@ -2,6 +2,7 @@
 
 use volumes::{Body, Inside, Volume};
 
+use crate::file::File;
 use crate::options::InputOptions;
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -9,8 +10,8 @@ use crate::values::Label;
 
 const LISTED: usize = 20;
 
-pub fn body(path: &Path, options: &InputOptions) -> Result<Body> {
-    let volume = volumes::read(path)?;
+pub(crate) fn body(file: &File, options: &InputOptions) -> Result<Body> {
+    let volume = file.volume()?;
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
@@ -19,7 +20,7 @@ pub fn body(path: &Path, options: &InputOptions) -> Result<Body> {
             );
         }
         (None, Some(threshold)) => Inside::Above(threshold),
-        (None, None) => usual(&volume, path)?,
+        (None, None) => usual(&volume, &file.path)?,
     };
     Ok(volume.body(inside)?)
 }
@@ -52,14 +53,20 @@ pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
     let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
         return Ok(None);
     };
-    let path = absolute(input)?;
-    let labels = volumes::read(&path)?.labels().unwrap_or_default();
+    let file = File {
+        path: match input.contents() {
+            None => absolute(input.name())?,
+            Some(_) => input.name().into(),
+        },
+        contents: input.contents().cloned(),
+    };
+    let labels = file.volume()?.labels().unwrap_or_default();
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
         refuse!(
             "{} holds no labels, which are whole numbers other than 0: give `threshold` VALUE, above which is inside",
-            path.display()
+            file.path.display()
         );
     }
     Ok(Some(labels))

@@ -44,8 +44,17 @@ pub(crate) fn up_line(format: Format, up: UpAxis) -> String {
 /// [`Error::UnknownFormat`]; [`Error::Io`] if the file cannot be read.
 pub fn up_axis(path: impl AsRef<Path>) -> Result<UpAxis, Error> {
     let path = path.as_ref();
+    Format::of(path)?;
+    up_axis_of(&files::read(path)?, path)
+}
+
+/// The axis that points up in the bytes of a mesh file of that name; see [`up_axis`].
+///
+/// # Errors
+/// [`Error::UnknownFormat`].
+pub fn up_axis_of(bytes: &[u8], path: impl AsRef<Path>) -> Result<UpAxis, Error> {
+    let path = path.as_ref();
     let format = Format::of(path)?;
-    let bytes = files::read(path)?;
     // The lines in which a file may name it.
     let header: Vec<&[u8]> = match format {
         Format::Stl => bytes.get(..80).into_iter().collect(),

@@ -81,7 +81,7 @@ pub use closed::{ClosedMesh, Warning};
 pub use distance::{MeshDistance, hausdorff_distance};
 pub use error::Error;
 pub use fairing::{Fairing, Followed};
-pub use format::{up_axis, usual_up_axis};
+pub use format::{up_axis, up_axis_of, usual_up_axis};
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use mesh::TriangleMesh;
 pub use read::error::FormatError;

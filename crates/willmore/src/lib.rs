@@ -27,6 +27,22 @@
 //! If the bricks near the surface are less than half of the grid, only they are stored. Time steps are of second order, and as long as their
 //! errors allow. The methods of [`Willmore`] change these defaults.
 //!
+//! # Meshes, segmentations, drawings
+//!
+//! The jobs of the program `willmore` are functions: [`fair`](jobs::fair), [`flow`](jobs::flow), [`inpaint`](jobs::inpaint),
+//! [`surfaces_of_labels`](jobs::surfaces_of_labels), [`sample`](jobs::sample), and [`run_in_folder`](jobs::run_in_folder) for runs that are kept. They choose the
+//! grid, and tell what it holds and loses.
+//!
+//! ```no_run
+//! use willmore::prelude::*;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let smooth = fair(FairOptions::of("scan.obj"), &Silent)?;
+//! println!("the noise was {:?}", smooth.summary.mesh.and_then(|mesh| mesh.noise));
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Parts of one's own
 //!
 //! | part | trait | example |
@@ -56,6 +72,8 @@
 //! - [`fem`]: finite elements,
 //! - [`solver`]: one time step,
 //! - [`engine`]: cases and the loop over steps,
+//! - [`jobs`]: from files and options to results,
+//! - [`surfaces`], [`volumes`]: meshes, segmentations,
 //! - [`runs`]: run folders.
 //!
 //! Your program needs an optimized profile: `cargo run --release`, or `opt-level = 3` under `[profile.dev]` and
@@ -66,7 +84,10 @@ mod builder;
 pub mod prelude;
 
 pub use builder::{Error, Kept, Willmore};
-pub use {engine, fem, geometry, linearize, mean_curvature, model, operators, runs, solver};
+pub use {
+    engine, fem, geometry, jobs, linearize, mean_curvature, model, operators, runs, solver,
+    surfaces, volumes,
+};
 
 /// The programs of these documents are compiled and run.
 #[cfg(doctest)]

@@ -16,6 +16,14 @@ pub use geometry::{
     Field, Grid, NodeSet, Nodes, PhaseField, SignedDistance, SignedDistanceExt, Stored, ZeroSet,
     distance_from_phase_field, optimal_profile, phase_field,
 };
+pub use jobs::Error as JobError;
+pub use jobs::values::{Amount, Ansatz, Label, SizeTarget};
+pub use jobs::{
+    Command, FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions, Inside,
+    LabelSurface, Made, McfOptions, MeshReport, Note, Outcome, Results, RunOptions, SampleOptions,
+    Shape, Silent, Summary, Warning, Watcher, fair, flow, inpaint, mcf, repair, run_in_folder,
+    run_in_memory, sample, surfaces_of_labels,
+};
 pub use mean_curvature::{
     Calibration, Factors, Identity, MeanCurvatureStep, PhaseInverses, StepFailure, StepScales,
 };
@@ -31,3 +39,5 @@ pub use solver::{
     Target, Tension, TermCheck, widths_between,
 };
 pub use solver::{DomainScales, Error as StepError};
+pub use surfaces::{ClosedMesh, TriangleMesh};
+pub use volumes::Volume;

@@ -21,7 +21,7 @@ pub fn run(mut job: jobs::Command, console: &Console) -> Result<()> {
     if labels::with_each(&input, console, of_label)? {
         return Ok(());
     }
-    tell(&jobs::start(job, console)?, console)
+    tell(&jobs::run_in_folder(job, console)?, console)
 }
 
 /// Prints what came out of a run.

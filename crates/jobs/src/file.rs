@@ -1,0 +1,185 @@
+//! Inputs: files, their bytes in memory, and arrays.
+
+use std::borrow::Cow;
+use std::convert::Infallible;
+use std::fmt;
+use std::sync::Arc;
+
+use volumes::Volume;
+
+use crate::prelude::*;
+
+/// The input of a job: a file, a built-in shape or a region by its name, or the contents of a file in memory.
+#[derive(Clone)]
+pub struct Input {
+    name: String,
+    contents: Option<Contents>,
+}
+
+/// What stands for a file.
+#[derive(Clone)]
+pub(crate) enum Contents {
+    Bytes(Arc<[u8]>),
+    Volume(Arc<Volume>),
+}
+
+impl Input {
+    /// The bytes of a file of this name, whose extension says what they are.
+    pub fn bytes(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
+        Self {
+            name: name.into(),
+            contents: Some(Contents::Bytes(bytes.into())),
+        }
+    }
+
+    /// A mesh. Its coordinates keep all their digits.
+    ///
+    /// # Errors
+    /// A mesh without faces, or with vertices that are not finite.
+    pub fn mesh(name: &str, mesh: &TriangleMesh) -> Result<Self> {
+        let name = format!("{name}.ply");
+        let bytes = surfaces::encode(&name, mesh)?;
+        Ok(Self::bytes(name, bytes))
+    }
+
+    /// A segmentation, or a grey volume.
+    pub fn volume(name: &str, volume: Volume) -> Self {
+        Self {
+            name: format!("{name}.nii"),
+            contents: Some(Contents::Volume(Arc::new(volume))),
+        }
+    }
+
+    /// Its name: that of a file, `builtin:NAME`, or a region.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(crate) fn contents(&self) -> Option<&Contents> {
+        self.contents.as_ref()
+    }
+
+    /// A file has the same name wherever the program may run later.
+    pub(crate) fn rename(&mut self, path: &Path) {
+        self.name = path.to_string_lossy().into_owned();
+    }
+}
+
+impl From<&str> for Input {
+    fn from(name: &str) -> Self {
+        name.to_owned().into()
+    }
+}
+
+impl From<String> for Input {
+    fn from(name: String) -> Self {
+        Self {
+            name,
+            contents: None,
+        }
+    }
+}
+
+impl From<&Path> for Input {
+    fn from(path: &Path) -> Self {
+        path.to_string_lossy().into_owned().into()
+    }
+}
+
+impl FromStr for Input {
+    type Err = Infallible;
+
+    fn from_str(name: &str) -> Result<Self, Infallible> {
+        Ok(name.into())
+    }
+}
+
+impl fmt::Display for Input {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl fmt::Debug for Input {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(&self.name, f)
+    }
+}
+
+impl Serialize for Input {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.name)
+    }
+}
+
+/// A file, on disk or in memory.
+#[derive(Clone)]
+pub(crate) struct File {
+    pub path: PathBuf,
+    pub contents: Option<Contents>,
+}
+
+impl File {
+    /// Its bytes.
+    pub fn read(&self) -> Result<Cow<'_, [u8]>> {
+        Ok(match &self.contents {
+            Some(Contents::Bytes(bytes)) => Cow::Borrowed(bytes),
+            _ => Cow::Owned(files::read(&self.path)?),
+        })
+    }
+
+    /// The extension of its name.
+    pub fn extension(&self) -> String {
+        crate::paths::extension(&self.path)
+    }
+
+    /// The image in it.
+    pub fn image(&self) -> Result<images::Image> {
+        let Some(Contents::Bytes(bytes)) = &self.contents else {
+            return Ok(images::read(&self.path)?);
+        };
+        let decoded = images::decode(bytes);
+        Ok(decoded.map_err(|problem| images::Error::Format {
+            path: self.path.clone(),
+            problem,
+        })?)
+    }
+
+    /// The mesh in it.
+    pub fn mesh(&self) -> Result<TriangleMesh> {
+        if self.contents.is_none() {
+            return Ok(surfaces::read(&self.path)?);
+        }
+        Ok(surfaces::decode(&self.read()?, &self.path)?)
+    }
+
+    /// The axis that points up in that mesh.
+    pub fn up_axis(&self) -> Result<UpAxis> {
+        Ok(surfaces::up_axis_of(&self.read()?, &self.path)?)
+    }
+
+    /// The volume in it.
+    pub fn volume(&self) -> Result<Cow<'_, Volume>> {
+        Ok(match &self.contents {
+            None => Cow::Owned(volumes::read(&self.path)?),
+            Some(Contents::Volume(volume)) => Cow::Borrowed(volume),
+            Some(Contents::Bytes(bytes)) => {
+                let decoded = volumes::decode(bytes);
+                Cow::Owned(decoded.map_err(|problem| volumes::Error::Format {
+                    path: self.path.clone(),
+                    problem,
+                })?)
+            }
+        })
+    }
+
+    /// Whether it is a stack of images, which is a volume.
+    pub fn is_stack(&self) -> bool {
+        match &self.contents {
+            None => volumes::is_stack(&self.path),
+            // A single image is no volume.
+            Some(Contents::Bytes(bytes)) => volumes::decode(bytes).is_ok(),
+            Some(Contents::Volume(_)) => true,
+        }
+    }
+}

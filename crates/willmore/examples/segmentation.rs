@@ -1,0 +1,43 @@
+//! Smooth surfaces of all labels of a segmentation, each with the volume of its voxels.
+
+use willmore::prelude::*;
+
+/// Two organs, a ball and a box, in voxels of 2 mm.
+///
+/// # Errors
+/// Those of volumes.
+pub fn organs() -> Result<Volume, Box<dyn std::error::Error>> {
+    let size = 24;
+    let label = |voxel: usize| {
+        let [x, y, z] = [1, size, size * size].map(|stride| (voxel / stride % size) as f64);
+        let in_ball = (x - 7.0).hypot(y - 11.5).hypot(z - 11.5) < 5.0;
+        let in_box = (15.0..21.0).contains(&x) && (y - 11.5).abs() < 6.0 && (z - 11.5).abs() < 4.0;
+        u8::from(in_ball) + 2 * u8::from(in_box)
+    };
+    let labels = (0..size * size * size).map(label).collect();
+    Ok(Volume::of_labels([size; 3], [0.0; 3], [2.0; 3], labels)?)
+}
+
+/// A surface of each label.
+///
+/// # Errors
+/// Those of the job.
+pub fn smooth_surfaces(segmentation: Input) -> Result<Vec<LabelSurface>, JobError> {
+    let mut options = FairOptions::of(segmentation);
+    options.flow.run.input.cells = Some(40);
+    surfaces_of_labels(options, &Silent)
+}
+
+/// Runs the example; a test does, too.
+///
+/// # Errors
+/// Those of volumes and of the job.
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+    for LabelSurface { label, made } in smooth_surfaces(Input::volume("organs", organs()?))? {
+        let volume = made.summary.measure("volume").unwrap_or_default();
+        let mesh = made.shape.as_ref().and_then(Shape::mesh);
+        let faces = mesh.map_or(0, |mesh| mesh.faces.len());
+        println!("label {label}: {faces} triangles around {volume:.0} cubic millimetres");
+    }
+    Ok(())
+}
