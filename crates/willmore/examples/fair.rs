@@ -20,7 +20,7 @@ pub fn take_off_noise(scan: &Path, smooth: &Path) -> Result<f64, JobError> {
     Ok(moved.unwrap_or_default())
 }
 
-/// Runs the example; a test does, too.
+/// Runs the example.
 ///
 /// # Errors
 /// Those of the job.

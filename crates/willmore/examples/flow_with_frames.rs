@@ -30,7 +30,7 @@ pub fn run(folder: &Path) -> Result<Outcome, JobError> {
     run_in_folder(Command::Flow(options), &Printer)
 }
 
-/// Runs the example; a test does, too.
+/// Runs the example.
 ///
 /// # Errors
 /// Those of the job.

@@ -18,7 +18,7 @@ pub fn fill(drawing: &Path, region: &str, filled: &Path) -> Result<(), JobError>
     }
 }
 
-/// Runs the example; a test does, too.
+/// Runs the example.
 ///
 /// # Errors
 /// Those of the job.

@@ -7,11 +7,11 @@ use willmore::prelude::*;
 /// # Errors
 /// Those of volumes.
 pub fn organs() -> Result<Volume, Box<dyn std::error::Error>> {
-    let size = 24;
+    let size = 16;
     let label = |voxel: usize| {
         let [x, y, z] = [1, size, size * size].map(|stride| (voxel / stride % size) as f64);
-        let in_ball = (x - 7.0).hypot(y - 11.5).hypot(z - 11.5) < 5.0;
-        let in_box = (15.0..21.0).contains(&x) && (y - 11.5).abs() < 6.0 && (z - 11.5).abs() < 4.0;
+        let in_ball = (x - 4.5).hypot(y - 7.5).hypot(z - 7.5) < 3.5;
+        let in_box = (9.0..14.0).contains(&x) && (y - 7.5).abs() < 5.0 && (z - 7.5).abs() < 3.0;
         u8::from(in_ball) + 2 * u8::from(in_box)
     };
     let labels = (0..size * size * size).map(label).collect();
@@ -24,11 +24,11 @@ pub fn organs() -> Result<Volume, Box<dyn std::error::Error>> {
 /// Those of the job.
 pub fn smooth_surfaces(segmentation: Input) -> Result<Vec<LabelSurface>, JobError> {
     let mut options = FairOptions::of(segmentation);
-    options.flow.run.input.cells = Some(40);
+    options.flow.run.input.cells = Some(32);
     surfaces_of_labels(options, &Silent)
 }
 
-/// Runs the example; a test does, too.
+/// Runs the example.
 ///
 /// # Errors
 /// Those of volumes and of the job.

@@ -17,7 +17,7 @@ pub fn vesicle() -> Result<Results, JobError> {
     flow(options, &Silent)
 }
 
-/// Runs the example; a test does, too.
+/// Runs the example.
 ///
 /// # Errors
 /// Those of the job.
