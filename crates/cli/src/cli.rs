@@ -219,12 +219,12 @@ pub struct TrainOptions {
 
 impl RunCommand {
     /// The job and its options.
-    pub fn job(self) -> jobs::Command {
+    pub fn job(self) -> jobs::Job {
         match self {
-            Self::Flow(flow) => jobs::Command::Flow(flow.options),
-            Self::Fair(fair) => jobs::Command::Fair(fair.options),
-            Self::Inpaint(inpaint) => jobs::Command::Inpaint(inpaint.options),
-            Self::Mcf(mcf) => jobs::Command::Mcf(mcf.options),
+            Self::Flow(flow) => jobs::Job::Flow(flow.options),
+            Self::Fair(fair) => jobs::Job::Fair(fair.options),
+            Self::Inpaint(inpaint) => jobs::Job::Inpaint(inpaint.options),
+            Self::Mcf(mcf) => jobs::Job::Mcf(mcf.options),
         }
     }
 

@@ -105,13 +105,13 @@ fn defaults_are_those_of_the_library() {
         text(&cli.unwrap()).unwrap()
     };
     for (of_library, name) in [
-        (jobs::Command::Flow(FlowOptions::of("a.ply")), "flow"),
-        (jobs::Command::Fair(FairOptions::of("a.ply")), "fair"),
-        (jobs::Command::Mcf(McfOptions::of("a.ply")), "mcf"),
+        (jobs::Job::Flow(FlowOptions::of("a.ply")), "flow"),
+        (jobs::Job::Fair(FairOptions::of("a.ply")), "fair"),
+        (jobs::Job::Mcf(McfOptions::of("a.ply")), "mcf"),
     ] {
         assert_eq!(resolved(&of_library).unwrap(), typed(name));
     }
-    let inpainting = jobs::Command::Inpaint(InpaintOptions::of("a.ply", "m.png"));
+    let inpainting = jobs::Job::Inpaint(InpaintOptions::of("a.ply", "m.png"));
     let masked = resolved(&inpainting).unwrap();
     assert_eq!(masked.replace("mask = \"m.png\"\n", ""), typed("inpaint"));
 }

@@ -6,8 +6,8 @@ use engine::{
 use model::{Network, Networks};
 use solver::NewtonParams;
 
-use crate::command::Command;
 use crate::input::{InitialShape, usual_box};
+use crate::job::Job;
 use crate::options::{CommonOptions, FlowOptions, OperatorOptions};
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -92,7 +92,7 @@ impl OperatorOptions {
     }
 }
 
-impl Command {
+impl Job {
     /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
     pub(crate) fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
         match self {

@@ -2,13 +2,13 @@
 
 use surfaces::Repaired;
 
-use crate::command::Command;
 use crate::file::Input;
 use crate::input::repaired;
-use crate::job::run_in_memory;
+use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::options::{FairOptions, FlowOptions, InpaintOptions, McfOptions};
 use crate::prelude::*;
+use crate::session::run_in_memory;
 use crate::values::Label;
 use crate::volume;
 
@@ -17,7 +17,7 @@ use crate::volume;
 /// # Errors
 /// As [`run_in_memory`].
 pub fn flow(options: FlowOptions, watcher: &dyn Watcher) -> Result<Results> {
-    run_in_memory(Command::Flow(options), watcher)
+    run_in_memory(Job::Flow(options), watcher)
 }
 
 /// Mean curvature flow of an input, in memory.
@@ -25,7 +25,7 @@ pub fn flow(options: FlowOptions, watcher: &dyn Watcher) -> Result<Results> {
 /// # Errors
 /// As [`run_in_memory`].
 pub fn mcf(options: McfOptions, watcher: &dyn Watcher) -> Result<Results> {
-    run_in_memory(Command::Mcf(options), watcher)
+    run_in_memory(Job::Mcf(options), watcher)
 }
 
 /// Fills a region of an input smoothly, in memory.
@@ -33,7 +33,7 @@ pub fn mcf(options: McfOptions, watcher: &dyn Watcher) -> Result<Results> {
 /// # Errors
 /// As [`run_in_memory`].
 pub fn inpaint(options: InpaintOptions, watcher: &dyn Watcher) -> Result<Results> {
-    run_in_memory(Command::Inpaint(options), watcher)
+    run_in_memory(Job::Inpaint(options), watcher)
 }
 
 /// Takes the noise off a mesh, or makes a smooth mesh of a segmentation, in memory.
@@ -41,7 +41,7 @@ pub fn inpaint(options: InpaintOptions, watcher: &dyn Watcher) -> Result<Results
 /// # Errors
 /// As [`run_in_memory`].
 pub fn fair(options: FairOptions, watcher: &dyn Watcher) -> Result<Made<3>> {
-    match run_in_memory(Command::Fair(options), watcher)? {
+    match run_in_memory(Job::Fair(options), watcher)? {
         Results::Space(made) => Ok(made),
         Results::Plane(_) => unreachable!("curves were refused"),
     }

@@ -24,7 +24,6 @@
 //! Messages name options in backticks, as `cells`: a program can show them as it spells them.
 
 mod case;
-mod command;
 mod error;
 mod events;
 mod fair;
@@ -36,6 +35,7 @@ mod input;
 mod job;
 mod keep;
 mod made;
+mod notes;
 mod options;
 mod outcome;
 mod own;
@@ -46,6 +46,7 @@ mod prelude;
 mod presentation;
 mod run;
 mod sample;
+mod session;
 pub mod settings;
 mod space;
 pub mod values;
@@ -53,15 +54,15 @@ mod volume;
 mod words;
 
 pub use case::check_eps_over_h;
-pub use command::Command;
 pub use error::{Error, Result};
 pub use events::{GridDistance, Loss, Note, Progress, Silent, ThinParts, Warning, Watcher};
 pub use faired::MeshReport;
 pub use file::Input;
 pub use functions::{LabelSurface, fair, flow, inpaint, mcf, repair, surfaces_of_labels};
 pub use input::{Opened, open, usual_format};
-pub use job::{resume, run_in_folder, run_in_memory};
+pub use job::Job;
 pub use made::{Curve, Made, MeshFile, Results, Shape, Surface};
+pub use notes::{About, NetworkNote, RunNotes};
 pub use options::{
     CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions, InputOptions,
     Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions,
@@ -70,4 +71,5 @@ pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
 pub use presentation::Topology;
 pub use sample::sample;
+pub use session::{resume, run_in_folder, run_in_memory};
 pub use volume::{labels, named};

@@ -27,8 +27,10 @@ pub struct InputOptions {
     /// lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z, or - for standard input
     pub input: Option<Input>,
 
-    /// Cells per unit length of the box [default: 128 in 2D, 64 in 3D; those of a field; for a mesh, image or volume the coarsest of a few that
-    /// holds its thin parts]
+    /// Cells per unit length of the box [default: depends on the input]
+    ///
+    /// Without it a mesh, an image or a volume gets the coarsest of a few grids that holds its thin parts. A field keeps its own grid. Other shapes
+    /// get 128 cells in the plane and 64 in space.
     #[arg(long, value_name = "N", help_heading = GRID)]
     pub cells: Option<usize>,
 
@@ -36,8 +38,9 @@ pub struct InputOptions {
     #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
     pub box_side: Option<f64>,
 
-    /// Longest side of the shape in units of --box-side; the box is scaled to meshes, images and volumes, so that all other lengths are in
-    /// the units of the input [default: 0.6 of the box, for `fair` of a mesh 0.8 or 0.9]
+    /// Longest side of the shape in units of --box-side [default: 0.6 of the box, for `fair` of a mesh 0.8 or 0.9]
+    ///
+    /// The box is scaled to a mesh, an image or a volume. All other lengths are in the units of the input.
     #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
     pub side_length: Option<f64>,
 
@@ -45,15 +48,21 @@ pub struct InputOptions {
     #[arg(long, value_name = "SIDE", value_enum, help_heading = INPUT, hide_short_help = true)]
     pub inside: Option<Inside>,
 
-    /// Value between inside and outside: of an image its grey value from 0 to 1, or opacity [default: 0.5]; of a volume in its units
+    /// Value between inside and outside [default: 0.5 for an image]
+    ///
+    /// For an image it is a grey value or an opacity from 0 to 1. For a volume it is in the units of the volume, and larger values are inside.
     #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
     pub threshold: Option<f64>,
 
-    /// The label of a volume that is inside, or all: each but 0 becomes a surface of its own [default: the larger of two values]
+    /// The label of a volume that is inside, or all [default: the larger of two values]
+    ///
+    /// With all, each label but 0 becomes a surface of its own.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
     pub label: Option<Label>,
 
-    /// Mend a mesh that is open, crosses itself or is not oriented alike: a new mesh is made, and the changes are reported
+    /// Repair a mesh that is open, crosses itself or is not oriented alike
+    ///
+    /// The repair makes a new mesh, and the program reports the changes.
     #[arg(long, help_heading = INPUT, hide_short_help = true)]
     pub repair: bool,
 
@@ -92,8 +101,9 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "RATIO", help_heading = ADVANCED, hide_short_help = true)]
     pub eps_over_h: Option<f64>,
 
-    /// Which formulation of a step: accurate, the most accurate network, calibrated; calibrated, the paper's network, calibrated; or paper, as
-    /// in the paper
+    /// Formulation of a time step
+    ///
+    /// accurate: the most accurate network, calibrated. calibrated: the paper's network, calibrated. paper: as in the paper.
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -109,8 +119,10 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "FILE", help_heading = ADVANCED, hide_short_help = true)]
     pub network: Option<PathBuf>,
 
-    /// Which part of the phase field is stored: dense, the whole grid; bricks, cells near the surface; auto, bricks where they are less than half of
-    /// the grid; mean curvature flow, finite elements and the paper's networks always take the whole grid [default: auto]
+    /// Part of the phase field that is stored: dense, bricks or auto [default: auto]
+    ///
+    /// dense stores the whole grid, and bricks stores cells near the surface. auto takes bricks where they are less than half of the grid. Mean
+    /// curvature flow, finite elements and the paper's networks always take the whole grid.
     #[arg(
         long,
         value_name = "PART",
@@ -144,7 +156,7 @@ pub struct ForceOption {
 /// Where computations run.
 #[derive(Args, Serialize, Clone, Debug)]
 pub struct CommonOptions {
-    /// Where to compute: flex or ndarray (CPU), wgpu or cuda (GPU), if compiled in [default: the first compiled in]
+    /// Device: flex or ndarray (CPU), wgpu or cuda (GPU), if compiled in [default: the first compiled in]
     #[arg(long, value_name = "NAME", help_heading = RUN, hide_short_help = true)]
     pub device: Option<String>,
 
@@ -198,8 +210,9 @@ pub struct RunOptions {
     )]
     pub checkpoint_every: usize,
 
-    /// Axis that points up in pictures, on the page and in meshes that are written: x, y or z [default: the one that the mesh names, or
-    /// else y for .obj and builtin:figure, z for all others]
+    /// Axis that points up in pictures, on the page and in written meshes: x, y or z [default: depends on the input]
+    ///
+    /// Without it the axis is the one that the mesh names, or else y for .obj and builtin:figure, and z for all others.
     #[arg(long, value_name = "AXIS", help_heading = OUTPUT, hide_short_help = true)]
     pub up: Option<UpAxis>,
 
@@ -212,7 +225,9 @@ pub struct RunOptions {
     #[serde(skip)]
     pub output: Option<PathBuf>,
 
-    /// Write the result to this file too: a mesh (.ply, .obj, .stl) in space, a picture (.png, .svg) in the plane, - for standard output
+    /// Write the result to this file too
+    ///
+    /// In space it is a mesh (.ply, .obj, .stl), in the plane a picture (.png, .svg). - is standard output.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub save: Option<PathBuf>,
 
@@ -255,35 +270,44 @@ impl Default for RunOptions {
 #[derive(Args, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "kebab-case")]
 pub struct FlowOptions {
-    /// Time steps, in lengths of the input to the fourth power: controlled (of second order, by their error), auto (by the energy),
-    /// auto:FIRST, VALUE, doubling:FIRST, graded:FIRST,PART (of the time reached), growing:VALUE,COUNT, which doubles after so many, or
-    /// ramp:VALUE,HALVINGS, whose first step is divided [default: controlled; inpaint: a ramp; fair: graded, but controlled where only --steps
-    /// or --time end it]
+    /// Rule for the time steps, in lengths of the input to the fourth power [default: controlled]
+    ///
+    /// controlled: steps of second order, whose errors control their sizes. auto, auto:FIRST: steps that follow the energy. VALUE: equal steps.
+    /// doubling:FIRST: each step is twice the one before. graded:FIRST,PART: each step is a part of the time that is reached.
+    /// growing:VALUE,COUNT: steps double after COUNT of them. ramp:VALUE,HALVINGS: steps grow to VALUE from VALUE halved so often. `inpaint`
+    /// takes a ramp unless this is given. `fair` takes graded steps, and controlled ones if only --steps or --time ends it.
     #[arg(long, value_name = "TAU", help_heading = FLOW, hide_short_help = true)]
     pub tau: Option<StepRule>,
 
-    /// About what estimated time error controlled steps may make: a LENGTH in the units of the input for the whole run, or for each step a
-    /// part of how far the surface moves in it in percent [default: 1.5%]
+    /// Tolerated error of controlled time steps, a LENGTH or PERCENT [default: 1.5%]
+    ///
+    /// A length, in the units of the input, is for the whole run. A percentage is for each step: a part of the way of the surface in the step.
     #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true, help_heading = FLOW, hide_short_help = true)]
     pub tolerance: Option<Amount>,
 
-    /// Hold the volume of a shape in space: keep, a VALUE in the units of the input, or PERCENT of the volume at the beginning, as 90%;
-    /// for a segmentation that is the volume of its voxels without specks [default: keep for `fair` of a segmentation]
+    /// Hold the volume in space: keep, a VALUE, or PERCENT, as 90% [default: keep for `fair` of a segmentation]
+    ///
+    /// A value is in the units of the input. A percentage is of the volume at the beginning. For a segmentation that is the volume of its voxels
+    /// without specks.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub volume: Option<SizeTarget>,
 
-    /// Hold the length of a curve in the plane: keep, a VALUE, or PERCENT, as 105%. With `flow`, edges sharper than the interface become
-    /// round first, and the length comes back over the ramp
+    /// Hold the length of a curve in the plane: keep, a VALUE, or PERCENT, as 105%
+    ///
+    /// `flow` first makes edges round that are sharper than the interface. The length comes back over the ramp.
     #[arg(long, value_name = "TARGET", help_heading = SIZES, hide_short_help = true)]
     pub length: Option<SizeTarget>,
 
-    /// Hold the area: of the surface in space, of the inside in the plane; keep, a VALUE, or PERCENT, as 105%. With `flow` in space, edges
-    /// sharper than the interface become round first, and the area comes back over the ramp
+    /// Hold the area, in space of the surface, in the plane of the inside: keep, a VALUE, or PERCENT, as 105%
+    ///
+    /// In space `flow` first makes edges round that are sharper than the interface. The area comes back over the ramp.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub area: Option<SizeTarget>,
 
-    /// Keep the area of the surface and drive the volume to this reduced volume, above 0 and below 1: 6 sqrt(pi) V / A^(3/2); in the plane
-    /// keep the length and drive the area to 4 pi A / L^2; a ball has 1, a red blood cell 0.64
+    /// Keep the area of the surface, and drive the volume to this reduced volume, above 0 and below 1
+    ///
+    /// The reduced volume is 6 sqrt(pi) V / A^(3/2) for a volume V and an area A. A ball has 1, a red blood cell 0.64. In the plane the length L
+    /// stays, and the area A goes to this value of 4 pi A / L^2.
     #[arg(long, value_name = "PART", conflicts_with_all = ["volume", "area", "length"], help_heading = SIZES, hide_short_help = true)]
     pub reduced_volume: Option<f64>,
 
@@ -291,21 +315,27 @@ pub struct FlowOptions {
     #[arg(long, value_name = "STEPS", help_heading = SIZES, hide_short_help = true)]
     pub ramp: Option<usize>,
 
-    /// Spontaneous curvature c0, one over a length: the energy is 1/2 int (kappa - c0)^2 dA, with the sum kappa of the principal curvatures,
-    /// which is positive for a ball [default: 0]
+    /// Spontaneous curvature c0, one over a length [default: 0]
+    ///
+    /// The energy is 1/2 int (kappa - c0)^2 dA with the sum kappa of the principal curvatures, which is positive for a ball.
     #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub spontaneous_curvature: Option<f64>,
 
-    /// Surface tension: add this times the area of the surface, in the plane the length of the curve, to the energy; one over a length squared
-    /// [default: 0]
+    /// Surface tension, one over a length squared [default: 0]
+    ///
+    /// It adds this times the area of the surface to the energy, in the plane this times the length of the curve.
     #[arg(long, value_name = "SIGMA", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub tension: Option<f64>,
 
-    /// Pressure: add this times the volume, in the plane the area of the inside, to the energy; one over a length cubed [default: 0]
+    /// Pressure, one over a length cubed [default: 0]
+    ///
+    /// It adds this times the volume to the energy, in the plane this times the area of the inside.
     #[arg(long, value_name = "P", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub pressure: Option<f64>,
 
-    /// Stop when the Willmore energy is no more than this; a sphere has 8 pi = 25.13, a circle of radius R pi / R
+    /// Stop when the Willmore energy is no more than this
+    ///
+    /// A sphere has 8 pi = 25.13, a circle of radius R has pi / R.
     #[arg(long, value_name = "W", value_parser = positive, help_heading = FLOW, hide_short_help = true)]
     pub energy: Option<f64>,
 
@@ -324,22 +354,29 @@ pub struct FairOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// Take off noise of this standard deviation along the normals, in the units of the mesh [default: estimated from the mesh,
-    /// unless --time, --energy, --energy-ratio or --steps says when to stop; a segmentation flows for (1.6 voxels)^4, or until it has gone by .35 of a voxel]
+    /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
+    ///
+    /// It is measured along the normals. It is estimated unless --time, --energy, --energy-ratio or --steps says when to stop. A segmentation has no such
+    /// noise: it flows for the time (1.6 voxels)^4, or until its surface has moved by 0.35 of a voxel.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
 
-    /// Stop as soon as the Willmore energy is no more than this part of that at the beginning; `--volume keep` keeps the volume
+    /// Stop as soon as the Willmore energy is no more than this part of the energy at the beginning
+    ///
+    /// The volume changes, unless --volume keep holds it.
     #[arg(long, value_name = "PART", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub energy_ratio: Option<f64>,
 
-    /// Leave this where it is: everything in box:x0,y0,z0,x1,y1,z1, in ball:x,y,z,r or inside a closed mesh (.obj, .stl, .ply), in the
-    /// coordinates of the input, or its vertices of a colour, as colour:ff0000
+    /// Region of the mesh that stays where it is: a box, a ball, a closed mesh, or a colour
+    ///
+    /// Regions are box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r, or the inside of a closed mesh in a file (.obj, .stl, .ply), in the coordinates of the
+    /// input. colour:ff0000 names the vertices of a colour.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = FLOW)]
     pub keep: Option<String>,
 
-    /// Write a new mesh, the zero level set on the grid, in place of the input with its vertices moved; with --repair the input need not be
-    /// closed. A segmentation always gives a new mesh
+    /// Write a new mesh in place of the input with its vertices moved
+    ///
+    /// The new mesh is the zero level set on the grid. With --repair the input need not be closed. A segmentation always gives a new mesh.
     #[arg(long, help_heading = OUTPUT)]
     pub remesh: bool,
 
@@ -365,13 +402,14 @@ pub struct InpaintOptions {
     #[serde(flatten)]
     pub flow: FlowOptions,
 
-    /// The region that is filled: an image of the size of the input, or a square for the box of another input (its opaque pixels if some
-    /// are not, else the dark ones, or the light ones if most of its border is dark), box:x0,y0,x1,y1, ball:x,y,r, and in 3D
-    /// box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r
+    /// The region that is filled: an image, box:x0,y0,x1,y1, or ball:x,y,r, in 3D with z
+    ///
+    /// An image has the size of the input; for an input that is no image it is a square, which fills the box. Its opaque pixels are the region if some
+    /// pixels are transparent. Otherwise the dark pixels are the region, or the light ones if most of the border is dark.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = INPUT)]
     pub mask: Option<String>,
 
-    /// What the region holds at the beginning: keep, empty, full, or a region as box:... or ball:...
+    /// Shape in the region at the beginning: keep, empty, full, or box:... or ball:...
     #[arg(long, value_name = "SHAPE", default_value = "keep", help_heading = FLOW)]
     pub ansatz: Ansatz,
 }
@@ -396,11 +434,15 @@ pub struct SampleOptions {
     #[command(flatten)]
     pub input: InputOptions,
 
-    /// The file to write: a picture (.png, of a plane shape .svg), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz)
+    /// The file to write
+    ///
+    /// A picture (.png, of a plane shape .svg), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz).
     #[arg(long, value_name = "FILE")]
     pub save: PathBuf,
 
-    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z; may be given again
+    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
+    ///
+    /// It may be given several times.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub without: Vec<Region>,
 
@@ -412,12 +454,13 @@ pub struct SampleOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Write the zero level set on the grid in place of a mesh that is converted as it is, as with --cells and --without
+    /// Write the zero level set on the grid, also where a mesh would be converted as it is
     #[arg(long)]
     pub resample: bool,
 
-    /// Axis that points up in a picture or a mesh that is written: x, y or z [default: the one that the input names, or else y for
-    /// .obj and builtin:figure, z for all others]
+    /// Axis that points up in the picture or the mesh: x, y or z [default: depends on the input]
+    ///
+    /// Without it the axis is the one that the input names, or else y for .obj and builtin:figure, and z for all others.
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
 

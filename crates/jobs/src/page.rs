@@ -10,11 +10,14 @@ use pages::{
     ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames, markdown,
     thinned, viewer,
 };
+use render::Quality;
 use report::{Axis, LineChart, Marker, Series};
 
+use crate::notes::RunNotes;
 use crate::outcome::{self, Summary};
 use crate::paths::MESHES;
 use crate::prelude::*;
+use crate::space::Space;
 use crate::{own, plane, presentation, settings, words};
 
 /// Of longer sequences every second, third, ... picture is shown: a page should stay small enough to be mailed.
@@ -45,13 +48,12 @@ struct Files<'a> {
 
 impl Files<'_> {
     fn page(&self) -> Result<Page> {
-        let about = &engine::notes(self.run)["about"];
-        let text = |name: &str| about[name].as_str().unwrap_or_default();
+        let about = RunNotes::of(self.run)?.about;
         let outcome: Option<Summary> = (self.read(presentation::SUMMARY)?)
             .map(|bytes| serde_json::from_slice(&bytes))
             .transpose()
             .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
-        let mut page = Page::new(format!("willmore {} {}", text("command"), text("name")))
+        let mut page = Page::new(format!("willmore {} {}", about.command, about.name))
             .with_lead(self.lead(outcome.as_ref()));
         if let Some(shape) = self.shape()? {
             page = page.with(shape);
@@ -66,9 +68,10 @@ impl Files<'_> {
             let dimension = engine::dimension(self.run)?;
             numbers.push(words::numbers(&outcome.to_json(), dimension));
         }
-        let options = words::options(&options, text("command"));
+        let options = words::options(&options, &about.command);
         let options = Section::new("Options").with(options);
-        let program = Section::new("Program, network and device").with(words::program(about));
+        let program =
+            Section::new("Program, network and device").with(words::program(&json!(about)));
         Ok(page.with(numbers.with(options).with(program)))
     }
 
@@ -114,8 +117,8 @@ impl Files<'_> {
         let meshes: Vec<(&str, TriangleMesh)> = thinned(&stages, most)
             .map(|(label, name)| Ok((label.as_str(), read(name)?)))
             .collect::<Result<_>>()?;
-        let up = UpAxis::deserialize(&engine::notes(self.run)["presentation"]["up"]);
-        let view = View::from_front_left(up.unwrap_or_default());
+        let space: Space = RunNotes::of(self.run)?.presentation(self.run)?;
+        let view = View::from_front_left(space.up);
         Ok(Some(viewer(
             "The surface over the steps",
             &before_and_after(&meshes, view)?,
@@ -236,7 +239,9 @@ fn before_and_after(
     };
     let pictures = ends.iter().map(|(label, mesh)| {
         let others = ends.iter().flat_map(|(_, other)| corners(other));
-        let scene = Scene::of_mesh(mesh.clone()).view(view).beside(others);
+        // The view to turn is what people look at; `final.png` is the picture for figures.
+        let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);
+        let scene = scene.view(view).beside(others);
         let picture = scene.render([PIXELS; 2])?.to_png()?;
         let image = ImageElement::from_bytes(label, &picture)?;
         Ok(((*label).to_owned(), image))

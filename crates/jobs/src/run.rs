@@ -14,6 +14,7 @@ use crate::events::Progress;
 use crate::faired::{Faired, MeshReport};
 use crate::file::Input;
 use crate::made::Made;
+use crate::notes::{About, NetworkNote, RunNotes};
 use crate::options::{InputOptions, RunOptions};
 use crate::outcome::{GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
 use crate::page;
@@ -33,19 +34,25 @@ pub struct Plan<'a, const D: usize, O> {
 
 impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
     /// What is kept with the run.
-    pub fn notes(&self, case: &Case<D>, device: &ComputeDevice) -> Value {
+    pub fn notes(&self, case: &Case<D>, device: &ComputeDevice) -> RunNotes {
         let network = case.operator.network();
-        json!({
-            "about": {
-                "command": self.command,
-                "name": case.shape,
-                "program": format!("willmore {}", env!("CARGO_PKG_VERSION")),
-                "network": network.map(|n| json!({ "name": n.name, "checksum": n.network.fingerprint() })),
-                "device": format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
+        let before = self.format.as_deref().unwrap_or(O::USUAL);
+        RunNotes {
+            about: About {
+                command: self.command.to_owned(),
+                name: case.shape.clone(),
+                program: format!("willmore {}", env!("CARGO_PKG_VERSION")),
+                network: network.map(|named| NetworkNote {
+                    name: named.name.clone(),
+                    checksum: named.network.fingerprint(),
+                }),
+                device: format!("{} {:?}", device.kind(), device.dtype()).to_lowercase(),
             },
-            "presentation": self.presentation,
-            "extensions": [self.format.as_deref().unwrap_or(O::USUAL), self.extension()],
-        })
+            presentation: json!(self.presentation),
+            extensions: [before, self.extension()].map(str::to_owned),
+            steps: None,
+            was_over: false,
+        }
     }
 
     pub fn checkpoints(&self) -> Checkpoints {
@@ -377,8 +384,8 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
 
 /// What is in the folder of a run, or of its frames, and not of the run.
 fn foreign(stored: &StoredRun) -> Option<PathBuf> {
-    let extensions: [String; 2] =
-        Deserialize::deserialize(&engine::notes(stored)["extensions"]).unwrap_or_default();
+    // Of another program, nothing is known.
+    let extensions = RunNotes::of(stored).map_or_else(|_| Default::default(), |n| n.extensions);
     let frames = stored.path().join(presentation::FRAMES);
     // Where no commit knows a frame, none are listed but their folder.
     let left = stored.leftovers().flat_map(|path| match path.read_dir() {

@@ -1,6 +1,6 @@
 //! The options of a run, resolved, as a file in its folder.
 
-use crate::command::Command;
+use crate::job::Job;
 use crate::prelude::*;
 
 /// The file of all options, resolved, in the folder of a run.
@@ -12,8 +12,8 @@ pub const COMMAND: &str = "command";
 ///
 /// # Errors
 /// Options that TOML cannot hold, such as paths that are no text.
-pub fn resolved(command: &Command) -> Result<String> {
+pub fn resolved(job: &Job) -> Result<String> {
     let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
-    let options = toml::to_string(command).map_err(unwritable)?;
-    Ok(format!("{COMMAND} = {:?}\n{options}", command.name()))
+    let options = toml::to_string(job).map_err(unwritable)?;
+    Ok(format!("{COMMAND} = {:?}\n{options}", job.name()))
 }

@@ -27,7 +27,7 @@ pub fn run(folder: &Path) -> Result<Outcome, JobError> {
     options.run.steps = Some(4);
     options.run.frames = Some(2);
     options.run.output = Some(folder.to_owned());
-    run_in_folder(Command::Flow(options), &Printer)
+    run_in_folder(Job::Flow(options), &Printer)
 }
 
 /// Runs the example.

@@ -19,7 +19,7 @@ pub use geometry::{
 pub use jobs::Error as JobError;
 pub use jobs::values::{Amount, Ansatz, Label, SizeTarget};
 pub use jobs::{
-    Command, FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions, Inside,
+    FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions, Inside, Job,
     LabelSurface, Made, McfOptions, MeshReport, Note, Outcome, Results, RunOptions, SampleOptions,
     Shape, Silent, Summary, Warning, Watcher, fair, flow, inpaint, mcf, repair, run_in_folder,
     run_in_memory, sample, surfaces_of_labels,

@@ -1,5 +1,5 @@
 use engine::Stop;
-use jobs::settings;
+use jobs::{RunNotes, settings};
 use runs::RunDirectory;
 use serde_json::json;
 
@@ -25,7 +25,8 @@ pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
     let mut job = command.job();
     let stored_options = job.options();
     // A run that was over may have written the file of --save itself.
-    let was_over = stored.is_finished() || engine::notes(&stored)["was_over"] == true;
+    let notes = RunNotes::of(&stored)?;
+    let was_over = stored.is_finished() || notes.was_over;
     stored_options.force.force = options.force.force || was_over;
     if !stored.is_finished() || options.steps.is_some() {
         let outcome = jobs::resume(job, stored, options.steps, console)?;
@@ -37,8 +38,7 @@ pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
         jobs::write_page(&stored)?;
     }
     let folder = options.run.to_string_lossy();
-    let command = &engine::notes(&stored)["about"]["command"];
-    let outcome = json!({ "command": command, "finished": true, "run": folder });
+    let outcome = json!({ "command": notes.about.command, "finished": true, "run": folder });
     let advice = match engine::ended(&stored)? {
         Some(stop @ Stop::Steps(_)) => {
             format!(": {stop}; willmore resume {folder} --steps N goes on to N steps in all")

@@ -7,7 +7,7 @@ use crate::console::Console;
 use crate::error::{Error, Result};
 
 /// Makes a run, or one for each label of a volume.
-pub fn run(mut job: jobs::Command, console: &Console) -> Result<()> {
+pub fn run(mut job: jobs::Job, console: &Console) -> Result<()> {
     let input = job.options().input.clone();
     let of_label = |label| {
         let mut one = job.clone();
