@@ -115,7 +115,7 @@ pub fn run_in_memory(mut job: Job, watcher: &dyn Watcher) -> Result<Results> {
     })
 }
 
-/// Continues a stored run, perhaps to more steps, with the options that it [was started with](settings::stored).
+/// Continues a stored run, perhaps to more steps, with the options that it was started with: those of its [file](crate::settings::FILE).
 ///
 /// # Errors
 /// As [`run_in_folder`], and for folders that hold no such run.
