@@ -16,9 +16,9 @@ use crate::values::{Amount, SizeTarget};
 
 /// In a step the interface moves by at most so many widths of it.
 const LONGEST_MOVE: f64 = 2.0;
-/// The usual step of inpainting in units of the inner one,
+/// The usual time step of inpainting, in units of the inner step.
 const INPAINT_STEP: f64 = 16.0;
-/// which a ramp reaches that starts this many times halved: at the border of the region there is a jump.
+/// The ramp to this step starts with it halved so many times, since there is a jump at the border of the region.
 const INPAINT_HALVINGS: u32 = 12;
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;

@@ -31,11 +31,11 @@ pub enum Error {
     /// An option that says nothing about the input, or in this dimension.
     #[error("`{option}`{value} has no meaning for {what}: leave it out")]
     Foreign {
-        /// The option,
+        /// The option.
         option: &'static str,
-        /// its value, after a blank, where it helps,
+        /// A blank and its value, or nothing.
         value: String,
-        /// and what it has no meaning for.
+        /// The kind of the input, or the dimension.
         what: &'static str,
     },
     /// Options that contradict each other, or do not fit the input.
@@ -133,9 +133,9 @@ pub enum Error {
     NothingMoves {
         /// The input.
         input: String,
-        /// Nodes inside,
+        /// Nodes inside the shape.
         inside: usize,
-        /// of so many.
+        /// Nodes of the grid.
         nodes: usize,
     },
     /// A mesh that bounds nothing, and that can perhaps be repaired.

@@ -83,7 +83,7 @@ pub enum Warning {
     Specks {
         /// How many.
         count: usize,
-        /// How many voxels are inside now that were not before.
+        /// The change of the number of voxels inside.
         filled: isize,
     },
     /// The estimated noise of a mesh may be its edges.
@@ -114,11 +114,11 @@ pub struct Loss {
     pub thinnest: f64,
     /// The longest side of the mesh.
     pub longest_side: f64,
-    /// Parts and holes of the mesh,
+    /// Parts and holes of the mesh.
     pub of_mesh: Topology,
-    /// and of its surface on the grid.
+    /// Parts and holes of its surface on the grid.
     pub on_grid: Topology,
-    /// How far that is from the mesh.
+    /// The distance of that surface from the mesh.
     pub distance: GridDistance,
 }
 
@@ -178,11 +178,11 @@ impl fmt::Display for GridDistance {
 pub struct ThinParts {
     /// The part of the boundary at them.
     pub part: f64,
-    /// They are thinner than this,
+    /// The thickness below which parts and gaps are thin, in the units of the input.
     pub below: f64,
-    /// which is so many interface widths
+    /// This thickness in interface widths.
     pub widths: f64,
-    /// with so many cells per unit length.
+    /// Cells per unit length.
     pub cells: usize,
     /// Whether vertices follow the surface, which they do less well there; otherwise thin parts do not last.
     pub vertices_follow: bool,
@@ -288,11 +288,11 @@ pub enum Note {
     RoundEdges {
         /// Whether it is a curve, whose length it is about, and not a surface with an area.
         is_curve: bool,
-        /// The length or area after
+        /// The length or area with round edges.
         round: f64,
-        /// and before,
+        /// The length or area before.
         sharp: f64,
-        /// and to which it goes.
+        /// The length or area to which it goes.
         target: f64,
     },
     /// In the plane the area is that of the inside. Before version 0.1 the option held the length.
@@ -310,9 +310,9 @@ pub enum Note {
         step: usize,
         /// Its time.
         time: f64,
-        /// What there was
+        /// Parts and holes before the step.
         before: Topology,
-        /// and is now.
+        /// Parts and holes after it.
         now: Topology,
     },
 }

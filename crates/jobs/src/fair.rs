@@ -12,9 +12,9 @@ use crate::values::SizeTarget;
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
 
-/// Of a segmentation, details of so many voxels are taken for its steps,
+/// A segmentation flows for so long that details of so many voxels vanish, which are the staircase of its voxels.
 const STEPS: f64 = 1.6;
-/// as long as the surface goes no further than so many, root of the mean square.
+/// The surface of a segmentation goes no further than so many voxels, root of the mean square.
 const FARTHEST: f64 = 0.35;
 
 /// Where more than this part of the vertices is flat, edges may have been taken for noise.

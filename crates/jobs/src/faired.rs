@@ -4,7 +4,7 @@ use render::View;
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 use surfaces::hausdorff_distance;
 
-use crate::made::{MeshFile, Surface, encoded};
+use crate::made::Surface;
 use crate::prelude::*;
 
 const PIXELS: u32 = 640;
@@ -16,10 +16,7 @@ const LOST: Rgb = OKABE_ITO[1];
 
 /// What became of a surface.
 pub struct Faired {
-    /// A file with everything that the input had, unless the mesh is new.
-    pub file: Option<MeshFile>,
-    pub mesh: TriangleMesh,
-    pub up: UpAxis,
+    pub surface: Surface,
     pub displacement: Figure,
     pub report: MeshReport,
 }
@@ -32,29 +29,14 @@ impl Faired {
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
         let none_lost = vec![false; lengths.len()];
         Ok(Self {
-            file: None,
             displacement: figure(&mesh, &lengths, &none_lost, up)?,
             report: MeshReport::new(before, &mesh, &lengths),
-            mesh,
-            up,
+            surface: Surface {
+                mesh,
+                up,
+                file: None,
+            },
         })
-    }
-
-    /// The surface alone.
-    pub fn into_surface(self) -> Surface {
-        Surface {
-            mesh: self.mesh,
-            up: self.up,
-            file: self.file,
-        }
-    }
-
-    /// The bytes of a file: in the format of the input with everything that this had, in another one the triangles alone.
-    pub fn encode(&self, format: &str) -> Result<Vec<u8>> {
-        match &self.file {
-            Some(file) if file.format == format => Ok(file.bytes.clone()),
-            _ => encoded(&self.mesh, self.up, format),
-        }
     }
 }
 
@@ -72,30 +54,30 @@ pub fn surface(u: &Stored<3>, eps: f64) -> Result<TriangleMesh> {
 /// How a surface differs from the one that it was.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeshReport {
-    /// How far its vertices are from there, root of the mean square, in the units of the mesh,
+    /// Distance of its vertices from the old surface, root of the mean square, in the units of the mesh.
     pub displacement_rms: f64,
-    /// and in percent of the longest side.
+    /// This root of the mean square in percent of the longest side.
     pub displacement_rms_percent: f64,
-    /// The farthest of them,
+    /// The largest distance of a vertex from the old surface, in the units of the mesh.
     pub displacement_largest: f64,
-    /// and in percent.
+    /// This largest distance in percent of the longest side.
     pub displacement_largest_percent: f64,
-    /// The largest distance of a place of either surface from the other,
+    /// The Hausdorff distance of both surfaces, in the units of the mesh. A mesh that folds over itself has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hausdorff_distance: Option<f64>,
-    /// and in percent; a mesh that folds over itself has none.
+    /// The Hausdorff distance in percent of the longest side.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hausdorff_distance_percent: Option<f64>,
-    /// By how much the volume has changed, in percent,
+    /// The change of the volume, in percent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_change_percent: Option<f64>,
-    /// and the area.
+    /// The change of the area, in percent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area_change_percent: Option<f64>,
     /// Standard deviation of the noise that was taken off, in the units of the mesh; 0 where something else ended the flow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<f64>,
-    /// Where vertices followed the flow: the part that could not, in percent.
+    /// The part of the vertices that could not follow the flow, in percent; none for a new mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_behind_percent: Option<f64>,
 }

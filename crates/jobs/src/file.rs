@@ -55,8 +55,20 @@ impl Input {
         &self.name
     }
 
-    pub(crate) fn contents(&self) -> Option<&Contents> {
-        self.contents.as_ref()
+    pub(crate) fn is_in_memory(&self) -> bool {
+        self.contents.is_some()
+    }
+
+    /// The file that it names; its path is absolute unless it is in memory.
+    pub(crate) fn file(&self) -> Result<File> {
+        Ok(File {
+            path: if self.is_in_memory() {
+                self.name.clone().into()
+            } else {
+                crate::paths::absolute(&self.name)?
+            },
+            contents: self.contents.clone(),
+        })
     }
 
     /// A file has the same name wherever the program may run later.

@@ -11,7 +11,6 @@ use crate::events::{GridDistance, Loss, ThinParts};
 use crate::file::{File, Input};
 use crate::options::{FieldKind, InputOptions, Inside};
 use crate::own::{OwnMesh, thinnest};
-use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -140,20 +139,14 @@ pub fn repaired(input: &Input) -> Result<Repaired> {
 
 impl Source {
     fn of(input: &Input) -> Result<Self> {
-        let (name, contents) = (input.name(), input.contents());
-        if let (Some(built_in), None) = (name.strip_prefix("builtin:"), contents) {
+        let name = input.name();
+        if let (Some(built_in), false) = (name.strip_prefix("builtin:"), input.is_in_memory()) {
             return Ok(Self::BuiltIn(built_in.to_owned()));
         }
-        if contents.is_none() && Region::is_meant(name) {
+        if !input.is_in_memory() && Region::is_meant(name) {
             return Ok(Self::Region(name.parse().map_err(Error::Options)?));
         }
-        let file = File {
-            path: match contents {
-                None => absolute(name)?,
-                Some(_) => name.into(),
-            },
-            contents: contents.cloned(),
-        };
+        let file = input.file()?;
         Ok(match &*file.extension() {
             "obj" | "stl" | "ply" => Self::Mesh(file),
             "tif" | "tiff" if file.is_stack() => Self::Volume(file),

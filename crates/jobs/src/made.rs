@@ -85,6 +85,19 @@ pub struct Surface {
     pub file: Option<MeshFile>,
 }
 
+impl Surface {
+    /// The bytes of a mesh file: the file of the input in its own format, the triangles alone in another one.
+    ///
+    /// # Errors
+    /// Formats other than `ply`, `obj` and `stl`; a mesh without faces.
+    pub fn encode(&self, format: &str) -> Result<Vec<u8>> {
+        match &self.file {
+            Some(file) if file.format == format => Ok(file.bytes.clone()),
+            _ => encoded(&self.mesh, self.up, format),
+        }
+    }
+}
+
 /// The file of a mesh.
 #[derive(Clone, Debug)]
 pub struct MeshFile {
@@ -109,10 +122,7 @@ impl Shape {
                 dimension: 2,
                 formats: Plane::SAVED,
             }),
-            (Self::Surface(surface), _) => match &surface.file {
-                Some(file) if file.format == format => Ok(file.bytes.clone()),
-                _ => encoded(&surface.mesh, surface.up, format),
-            },
+            (Self::Surface(surface), _) => surface.encode(format),
         }
     }
 

@@ -23,19 +23,19 @@ pub struct Outcome {
     pub command: &'static str,
     /// The folder of the run.
     pub folder: PathBuf,
-    /// How many steps there are,
+    /// The number of steps.
     pub steps: usize,
-    /// and the time that they reach.
+    /// The time at the end.
     pub time: f64,
     /// The rule that ended the run; none if it was interrupted.
     pub ended: Option<Stop>,
-    /// What is known of a run that is over.
+    /// The results of a run that is over.
     pub summary: Option<Summary>,
     /// The page of the run, if there is one.
     pub page: Option<PathBuf>,
     /// The file to which the result goes besides, if one was chosen.
     pub save: Option<PathBuf>,
-    /// How long this took.
+    /// Wall time of the steps, in seconds.
     pub seconds: f64,
 }
 
@@ -64,19 +64,19 @@ pub struct Summary {
     pub command: String,
     /// True.
     pub finished: bool,
-    /// How many steps there are,
+    /// The number of steps.
     pub steps: usize,
-    /// and the time that they reach.
+    /// The time at the end.
     pub time: f64,
     /// What controlled steps say of themselves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_steps: Option<TimeAccuracy>,
     /// Steps that were made shorter than their rule wanted them.
     pub shortened_steps: usize,
-    /// The energy at the beginning,
+    /// The energy at the beginning; mean curvature flow has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_energy: Option<f64>,
-    /// and at the end; mean curvature flow has none.
+    /// The energy at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
     /// Spontaneous curvature, tension and pressure, if the energy is not the Willmore energy.

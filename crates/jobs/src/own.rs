@@ -7,7 +7,7 @@ use surfaces::Followed;
 
 use crate::faired::{Faired, MeshReport, figure, surface};
 use crate::keep;
-use crate::made::MeshFile;
+use crate::made::{MeshFile, Surface};
 use crate::paths::extension;
 use crate::prelude::*;
 use crate::presentation::Known;
@@ -244,13 +244,15 @@ impl OwnMesh {
             ..MeshReport::new(rough, &moved, &lengths)
         };
         Ok(Faired {
-            file: Some(MeshFile {
-                format: self.extension().to_owned(),
-                bytes: surfaces::rewrite(bytes, &self.file, &all)?,
-            }),
             displacement: figure(&moved, &lengths, &lost, up)?,
-            mesh: all,
-            up,
+            surface: Surface {
+                file: Some(MeshFile {
+                    format: self.extension().to_owned(),
+                    bytes: surfaces::rewrite(bytes, &self.file, &all)?,
+                }),
+                mesh: all,
+                up,
+            },
             report,
         })
     }

@@ -262,7 +262,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
     fn save(&self, u: &Stored<D>, eps: f64, faired: Option<&Faired>, path: &Path) -> Result<()> {
         let format = extension(path);
         let bytes = match faired {
-            Some(faired) => faired.encode(&format)?,
+            Some(faired) => faired.surface.encode(&format)?,
             None => self.presentation.encode(u, eps, &format)?,
         };
         Ok(files::write_atomically(path, |out| out.write_all(&bytes))?)

@@ -88,7 +88,7 @@ impl Presentation<3> for Space {
 
     fn shape(&self, u: &Stored<3>, eps: f64, faired: Option<Faired>) -> Result<Shape> {
         Ok(Shape::Surface(match faired {
-            Some(faired) => faired.into_surface(),
+            Some(faired) => faired.surface,
             None => Surface {
                 mesh: surface(u, eps)?,
                 up: self.up,

@@ -4,7 +4,6 @@ use volumes::{Body, Inside, Volume};
 
 use crate::file::File;
 use crate::options::InputOptions;
-use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Label;
 
@@ -53,13 +52,7 @@ pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
     let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
         return Ok(None);
     };
-    let file = File {
-        path: match input.contents() {
-            None => absolute(input.name())?,
-            Some(_) => input.name().into(),
-        },
-        contents: input.contents().cloned(),
-    };
+    let file = input.file()?;
     let labels = file.volume()?.labels().unwrap_or_default();
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
