@@ -7,7 +7,7 @@ use clap_complete::Shell;
 use jobs::values::count;
 use jobs::{
     CommonOptions, FairOptions, FlowOptions, ForceOption, InpaintOptions, InputOptions, McfOptions,
-    OperatorOptions, SampleOptions,
+    OperatorOptions, RunOptions, SampleOptions,
 };
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
@@ -228,13 +228,13 @@ impl RunCommand {
         }
     }
 
-    /// The options of its input and its results.
-    pub fn options(&mut self) -> &mut jobs::RunOptions {
+    /// The options of its input and of its run.
+    pub fn options(&mut self) -> (&mut InputOptions, &mut RunOptions) {
         match self {
-            Self::Flow(flow) => &mut flow.options.run,
-            Self::Fair(fair) => &mut fair.options.flow.run,
-            Self::Inpaint(inpaint) => &mut inpaint.options.flow.run,
-            Self::Mcf(mcf) => &mut mcf.options.run,
+            Self::Flow(flow) => (&mut flow.options.input, &mut flow.options.run),
+            Self::Fair(fair) => (&mut fair.options.input, &mut fair.options.run),
+            Self::Inpaint(inpaint) => (&mut inpaint.options.input, &mut inpaint.options.run),
+            Self::Mcf(mcf) => (&mut mcf.options.input, &mut mcf.options.run),
         }
     }
 }

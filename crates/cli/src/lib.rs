@@ -40,9 +40,9 @@ pub fn main(arguments: &[OsString], mut console: Console) -> u8 {
 
 fn execute(mut cli: Cli, console: &mut Console) -> Result<()> {
     let standard = Standard::open(&mut cli.command, cli.messages)?;
-    console.set(cli.messages, standard.is_piped());
+    console.set(cli.messages, standard.output().is_some());
     match cli.command {
-        Command::Run(command) => run::run(command.job(), console),
+        Command::Run(command) => run::run(command.job(), standard.output(), console),
         Command::Resume(options) => resume::run(&options, console),
         Command::Networks { show } => about::networks(show.as_ref(), console),
         Command::Info => about::info(console),

@@ -1,7 +1,7 @@
 //! `-` for standard input and output: files that stand for them while a command runs.
 
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
@@ -22,7 +22,7 @@ pub struct Standard {
 impl Standard {
     /// Reads standard input if it is the input, and puts files in place of every `-` in the options.
     pub fn open(command: &mut Command, messages: MessageOptions) -> Result<Self> {
-        let Some(Paths { input, save, once }) = paths(command) else {
+        let Some((input, save)) = paths(command) else {
             return Ok(Self::default());
         };
         let reads = input
@@ -58,9 +58,6 @@ impl Standard {
             if input.label == Some(Label::All) {
                 refuse!("--save - writes one mesh, and --label all makes several: give a file");
             }
-            if let Some(once) = once {
-                *once = true;
-            }
             let format = match &input.input {
                 Some(input) => jobs::usual_format(input)?,
                 None => return Err(jobs::Error::NoInput.into()),
@@ -74,9 +71,9 @@ impl Standard {
         })
     }
 
-    /// Whether standard output is a result.
-    pub fn is_piped(&self) -> bool {
-        self.output.is_some()
+    /// The file that stands for standard output, if that is a result.
+    pub fn output(&self) -> Option<&Path> {
+        self.output.as_deref()
     }
 
     /// Writes the result to standard output, if it goes there.
@@ -92,32 +89,13 @@ impl Standard {
 }
 
 /// The input of a command and the file that it writes, if it has these.
-struct Paths<'a> {
-    input: &'a mut InputOptions,
-    save: Option<&'a mut PathBuf>,
-    /// Where a run notes that the file is for this time alone.
-    once: Option<&'a mut bool>,
-}
-
-fn paths(command: &mut Command) -> Option<Paths<'_>> {
+fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBuf>)> {
     match command {
-        Command::Check(check) => Some(Paths {
-            input: &mut check.options.input,
-            save: None,
-            once: None,
-        }),
-        Command::Sample(sample) => Some(Paths {
-            input: &mut sample.input,
-            save: Some(&mut sample.save),
-            once: None,
-        }),
+        Command::Check(check) => Some((&mut check.options.input, None)),
+        Command::Sample(sample) => Some((&mut sample.input, Some(&mut sample.save))),
         Command::Run(command) => {
-            let options = command.options();
-            Some(Paths {
-                input: &mut options.input,
-                save: options.save.as_mut(),
-                once: Some(&mut options.saves_once),
-            })
+            let (input, run) = command.options();
+            Some((input, run.save.as_mut()))
         }
         _ => None,
     }

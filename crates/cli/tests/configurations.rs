@@ -132,7 +132,7 @@ fn named_configurations() {
             let Command::Run(RunCommand::Flow(flow)) = &cli.command else {
                 panic!("{cli:?}");
             };
-            let input = flow.options.run.input.input.as_ref();
+            let input = flow.options.input.input.as_ref();
             assert_eq!(input.map(jobs::Input::name), Some("a.ply"));
         });
 }

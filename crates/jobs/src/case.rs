@@ -8,7 +8,7 @@ use solver::NewtonParams;
 
 use crate::input::{InitialShape, usual_box};
 use crate::job::Job;
-use crate::options::{CommonOptions, FlowOptions, OperatorOptions};
+use crate::options::{CommonOptions, FlowOptions, OperatorOptions, WillmoreOptions};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -111,8 +111,8 @@ impl Job {
     /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
     pub(crate) fn usual_steps(&mut self) -> usize {
         let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
-        let energy = self.willmore().and_then(|flow| flow.energy);
-        let has_an_end = fairs || energy.is_some() || self.options().time.is_some();
+        let energy = self.willmore().and_then(|options| options.energy);
+        let has_an_end = fairs || energy.is_some() || self.run().time.is_some();
         match self {
             _ if !has_an_end => 20,
             Self::Mcf(_) => 100_000,
@@ -120,13 +120,12 @@ impl Job {
         }
     }
 
-    fn stops(&mut self, rule: StepRule) -> Vec<Stop> {
+    fn stops(&mut self, steps: usize, rule: StepRule) -> Vec<Stop> {
         // What has gone wrong is said before what was asked for.
         let mut stops = vec![Stop::Vanished, Stop::NoSurface, Stop::AtTheSide];
-        let options = self.options();
-        stops.extend(options.steps.map(Stop::Steps));
-        stops.extend(options.time.map(Stop::Time));
-        let energy = self.willmore().and_then(|flow| flow.energy);
+        stops.push(Stop::Steps(steps));
+        stops.extend(self.run().time.map(Stop::Time));
+        let energy = self.willmore().and_then(|options| options.energy);
         stops.extend(energy.map(Stop::Energy));
         if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
             stops.push(Stop::EnergyAtRest);
@@ -137,29 +136,32 @@ impl Job {
         stops
     }
 
-    /// The flow from a start, and how that is shown; the rule for the time steps is filled in.
+    /// The flow from a start for at most so many steps, and how that is shown; the rule for the time steps is filled in.
     pub(crate) fn case<const D: usize, O: Presentation<D>>(
         &mut self,
         start: InitialShape<D, O>,
+        most_steps: usize,
     ) -> Result<(Case<D>, O)> {
         let (flow, method) = match self {
             Self::Mcf(mcf) => (Flow::MeanCurvature, mcf.method),
             _ => (Flow::Willmore, Method::Hybrid),
         };
         let grid = *start.initial.grid();
-        let options = self.options();
-        let (mut scales, operator) = options.operator.on_grid(method, &grid)?;
+        let (mut scales, operator) = self.operator().on_grid(method, &grid)?;
         // Time steps that follow from the inner step, a length squared, do so in a box of this side, which gives them their unit.
         let in_box = |side: f64| scales.mcf_step * (grid.side() / side).powi(2);
         let (_, usual_side) = usual_box::<D>();
-        let inner = in_box(options.input.box_side.unwrap_or(usual_side));
+        let inner = in_box(self.input().box_side.unwrap_or(usual_side));
         let usual_inner = in_box(usual_side);
         let usual = self.usual_rule(inner, grid.spacing());
         let rule = match self.willmore() {
-            Some(flow) => *flow.tau.insert(flow.tau.unwrap_or(usual).resolved(inner)),
+            Some(options) => {
+                let rule = options.tau.unwrap_or(usual);
+                *options.tau.insert(rule.resolved(inner))
+            }
             None => StepRule::Constant(scales.mcf_step),
         };
-        let stops = self.stops(rule);
+        let stops = self.stops(most_steps, rule);
         let options = self.willmore().map(|options| &*options);
         let steps = match rule {
             StepRule::Controlled => {
@@ -214,7 +216,7 @@ pub(crate) struct SizeTargets {
     volume: Option<SizeTarget>,
 }
 
-impl FlowOptions {
+impl WillmoreOptions {
     /// The sizes that options name, in this dimension. In the plane `volume` is another word for the area.
     pub(crate) fn size_targets<const D: usize>(&self) -> SizeTargets {
         let (perimeter, volume) = if D == 2 {
@@ -278,7 +280,11 @@ impl FlowOptions {
 /// # Errors
 /// With the volume held, where edges cannot be made round.
 pub fn with_round_edges<const D: usize>(
-    options: &mut FlowOptions,
+    FlowOptions {
+        willmore: options,
+        operator,
+        ..
+    }: &mut FlowOptions,
     start: &mut Stored<D>,
     device: &ComputeDevice,
     watcher: &dyn Watcher,
@@ -288,7 +294,7 @@ pub fn with_round_edges<const D: usize>(
         return Ok(());
     }
     let holds_volume = wanted.volume.is_some() || options.reduced_volume.is_some();
-    let (scales, operator) = options.run.operator.on_grid(Method::Hybrid, start.grid())?;
+    let (scales, operator) = operator.on_grid(Method::Hybrid, start.grid())?;
     let eps = scales.eps;
     let sharp = ZeroSet::of(start, eps)?;
     if sharp.sizes_hold() {

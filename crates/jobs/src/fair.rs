@@ -3,7 +3,7 @@ use std::f64::consts::PI;
 use crate::file::File;
 use crate::input::{Loaded, Source, closed};
 use crate::keep;
-use crate::options::FairOptions;
+use crate::options::{FairOptions, WillmoreOptions};
 use crate::own::OwnMesh;
 use crate::paths::absolute;
 use crate::prelude::*;
@@ -23,20 +23,23 @@ const FLAT: f64 = 0.05;
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
     pub(crate) fn takes_small_steps(&self) -> bool {
-        let ratio = self.energy_ratio.or(self.flow.energy);
-        self.noise.is_some() || ratio.is_some() || !self.ends
+        let ratio = self.energy_ratio.or(self.willmore.energy);
+        self.noise.is_some() || ratio.is_some() || !self.says_when_to_end()
     }
 
-    pub(crate) fn check(&mut self) -> Result<()> {
-        let flow = &self.flow;
-        self.ends = self.energy_ratio.is_some()
-            || flow.run.time.is_some()
-            || flow.energy.is_some()
-            || flow.run.steps.is_some();
+    /// Whether an option other than the noise says when it ends.
+    pub(crate) fn says_when_to_end(&self) -> bool {
+        self.energy_ratio.is_some()
+            || self.willmore.energy.is_some()
+            || self.run.time.is_some()
+            || self.run.steps.is_some()
+    }
+
+    pub(crate) fn check(&self) -> Result<()> {
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             refuse!("`energy_ratio` {ratio} is reached before the first step: give a part below 1");
         }
-        if let Some(energy) = self.flow.energy.filter(|energy| *energy < BALL) {
+        if let Some(energy) = self.willmore.energy.filter(|energy| *energy < BALL) {
             refuse!(
                 "`energy` {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
                  off the noise, or give `energy_ratio` 0.5 for half the energy that there is"
@@ -46,7 +49,8 @@ impl FairOptions {
     }
 
     pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
-        let mut reader = self.flow.run.reader(device, watcher)?;
+        let ends = self.says_when_to_end();
+        let mut reader = self.input.reader(&self.operator, device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         let loaded = match reader.source.clone() {
             Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
@@ -57,20 +61,20 @@ impl FairOptions {
             }
             Source::Volume(_) => {
                 let mut loaded = reader.load()?;
-                let flow = &mut self.flow;
+                let willmore = &mut self.willmore;
                 // That of the voxels is kept.
-                if flow.reduced_volume.is_none() {
-                    flow.volume.get_or_insert(SizeTarget::Keep);
+                if willmore.reduced_volume.is_none() {
+                    willmore.volume.get_or_insert(SizeTarget::Keep);
                 }
                 if let Loaded::Space(start) = &mut loaded
-                    && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !self.ends)
+                    && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !ends)
                 {
                     voxels.farthest = Some(FARTHEST * voxels.side);
                     voxels.time = Some((STEPS * voxels.side).powi(4));
                 }
                 loaded
             }
-            _ if self.noise.is_some() || self.keep.is_some() || !self.ends => {
+            _ if self.noise.is_some() || self.keep.is_some() || !ends => {
                 refuse!(
                     "only a mesh in a file has noise to take off: say how smooth the surface is to become, by `energy_ratio`, `time`, \
                      `energy` or `steps`, without `noise` and `keep`",
@@ -92,7 +96,7 @@ impl FairOptions {
         device: DeviceKind,
         watcher: &dyn Watcher,
     ) -> Result<Loaded> {
-        let (path, repairs) = (&file.path, self.flow.run.input.repair);
+        let (path, repairs) = (&file.path, self.input.repair);
         if repairs && !self.remesh {
             refuse!(
                 "`repair` makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give `remesh`",
@@ -107,13 +111,17 @@ impl FairOptions {
         } else {
             file.read()?.into_owned()
         };
-        let noise = self.noise.or(self.ends.then_some(0.0));
-        let to_target = matches!(self.flow.volume, Some(SizeTarget::To(_)));
+        let noise = self.noise.or(self.says_when_to_end().then_some(0.0));
+        let WillmoreOptions {
+            volume,
+            reduced_volume,
+            ..
+        } = self.willmore;
         let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
         own.check_movable(path)?;
-        own.keeps_volume = self.flow.volume == Some(SizeTarget::Keep);
-        own.drives_volume = to_target || self.flow.reduced_volume.is_some();
+        own.keeps_volume = volume == Some(SizeTarget::Keep);
+        own.drives_volume = matches!(volume, Some(SizeTarget::To(_))) || reduced_volume.is_some();
         for change in changes {
             watcher.warning(&Warning::Mended {
                 path: path.clone(),
@@ -145,7 +153,7 @@ impl FairOptions {
             }
             self.noise = Some(noise);
         }
-        let mut reader = self.flow.run.reader(device, watcher)?;
+        let mut reader = self.input.reader(&self.operator, device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         reader.own(own, file)
     }

@@ -64,11 +64,11 @@ pub fn surfaces_of_labels(
     mut options: FairOptions,
     watcher: &dyn Watcher,
 ) -> Result<Vec<LabelSurface>> {
-    options.flow.run.input.label = Some(Label::All);
-    let labels = volume::labels(&options.flow.run.input)?;
+    options.input.label = Some(Label::All);
+    let labels = volume::labels(&options.input)?;
     let of_label = |label| {
         let mut one = options.clone();
-        one.flow.run.input.label = Some(Label::One(label));
+        one.input.label = Some(Label::One(label));
         let made = fair(one, watcher)?;
         Ok(LabelSurface { label, made })
     };

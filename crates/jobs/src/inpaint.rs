@@ -17,7 +17,8 @@ impl InpaintOptions {
     }
 
     pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
-        let loaded = self.flow.run.reader(device, watcher)?.load()?;
+        let mut reader = self.input.reader(&self.operator, device, watcher)?;
+        let loaded = reader.load()?;
         let mask = self.mask.as_deref().unwrap_or_default();
         Ok(match loaded {
             Loaded::Plane(mut start) => {
@@ -51,7 +52,7 @@ impl InpaintOptions {
                 grid.side()
             );
         }
-        let eps = self.flow.run.operator.eps_over_h() * grid.spacing();
+        let eps = self.operator.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
             Ansatz::Keep => field.clone(),
             Ansatz::Empty => Field::constant(grid, -1.0),

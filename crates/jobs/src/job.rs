@@ -1,6 +1,9 @@
 //! Jobs that make runs.
 
-use crate::options::{FairOptions, FlowOptions, InpaintOptions, McfOptions, RunOptions};
+use crate::options::{
+    CommonOptions, FairOptions, FlowOptions, InpaintOptions, InputOptions, McfOptions,
+    OperatorOptions, RunOptions, WillmoreOptions,
+};
 use crate::prelude::*;
 
 /// A job that makes a run, with its options.
@@ -17,6 +20,16 @@ pub enum Job {
     Mcf(McfOptions),
 }
 
+/// The groups of options that jobs share.
+pub(crate) struct Groups<'a> {
+    /// Mean curvature flow has no energy and no controlled steps.
+    pub willmore: Option<&'a mut WillmoreOptions>,
+    pub input: &'a mut InputOptions,
+    pub operator: &'a mut OperatorOptions,
+    pub run: &'a mut RunOptions,
+    pub common: &'a mut CommonOptions,
+}
+
 impl Job {
     /// Its name.
     pub fn name(&self) -> &'static str {
@@ -28,23 +41,61 @@ impl Job {
         }
     }
 
-    /// The options that all jobs have.
-    pub fn options(&mut self) -> &mut RunOptions {
-        match self {
-            Self::Flow(flow) => &mut flow.run,
-            Self::Fair(fair) => &mut fair.flow.run,
-            Self::Inpaint(inpaint) => &mut inpaint.flow.run,
-            Self::Mcf(mcf) => &mut mcf.run,
-        }
+    /// The options of Willmore flow; mean curvature flow has none.
+    pub fn willmore(&mut self) -> Option<&mut WillmoreOptions> {
+        self.groups().willmore
     }
 
-    /// The options of Willmore flow; mean curvature flow has no energy and no controlled steps.
-    pub(crate) fn willmore(&mut self) -> Option<&mut FlowOptions> {
+    /// The options of its input.
+    pub fn input(&mut self) -> &mut InputOptions {
+        self.groups().input
+    }
+
+    /// The options of its operator.
+    pub fn operator(&mut self) -> &mut OperatorOptions {
+        self.groups().operator
+    }
+
+    /// The options of its run.
+    pub fn run(&mut self) -> &mut RunOptions {
+        self.groups().run
+    }
+
+    /// Where it computes.
+    pub fn common(&mut self) -> &mut CommonOptions {
+        self.groups().common
+    }
+
+    pub(crate) fn groups(&mut self) -> Groups<'_> {
         match self {
-            Self::Flow(flow) => Some(flow),
-            Self::Fair(fair) => Some(&mut fair.flow),
-            Self::Inpaint(inpaint) => Some(&mut inpaint.flow),
-            Self::Mcf(_) => None,
+            Self::Flow(flow) => Groups {
+                willmore: Some(&mut flow.willmore),
+                input: &mut flow.input,
+                operator: &mut flow.operator,
+                run: &mut flow.run,
+                common: &mut flow.common,
+            },
+            Self::Fair(fair) => Groups {
+                willmore: Some(&mut fair.willmore),
+                input: &mut fair.input,
+                operator: &mut fair.operator,
+                run: &mut fair.run,
+                common: &mut fair.common,
+            },
+            Self::Inpaint(inpaint) => Groups {
+                willmore: Some(&mut inpaint.willmore),
+                input: &mut inpaint.input,
+                operator: &mut inpaint.operator,
+                run: &mut inpaint.run,
+                common: &mut inpaint.common,
+            },
+            Self::Mcf(mcf) => Groups {
+                willmore: None,
+                input: &mut mcf.input,
+                operator: &mut mcf.operator,
+                run: &mut mcf.run,
+                common: &mut mcf.common,
+            },
         }
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut options = FlowOptions::of("builtin:cross");
-//! options.run.input.cells = Some(24);
+//! options.input.cells = Some(24);
 //! options.run.steps = Some(2);
 //! let results = jobs::flow(options, &Silent)?;
 //! let summary = results.summary();
@@ -65,11 +65,11 @@ pub use made::{Curve, Made, MeshFile, Results, Shape, Surface};
 pub use notes::{About, NetworkNote, RunNotes};
 pub use options::{
     CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions, InputOptions,
-    Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions,
+    Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions, WillmoreOptions,
 };
 pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
 pub use presentation::Topology;
 pub use sample::sample;
-pub use session::{resume, run_in_folder, run_in_memory};
+pub use session::{resume, run_and_save, run_in_folder, run_in_memory};
 pub use volume::{labels, named};

@@ -178,15 +178,6 @@ impl Default for CommonOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// The input.
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub input: InputOptions,
-    /// The operator.
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub operator: OperatorOptions,
-
     /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
     pub steps: Option<usize>,
@@ -231,26 +222,15 @@ pub struct RunOptions {
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub save: Option<PathBuf>,
 
-    /// Whether the file to save is for this time alone: a run that is resumed does not write it again.
-    #[arg(skip)]
-    #[serde(skip)]
-    pub saves_once: bool,
-
     /// Whether files and runs are written over.
     #[command(flatten)]
     #[serde(skip)]
     pub force: ForceOption,
-    /// Device and seed.
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub common: CommonOptions,
 }
 
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
-            input: InputOptions::default(),
-            operator: OperatorOptions::default(),
             steps: None,
             time: None,
             frames: None,
@@ -259,17 +239,15 @@ impl Default for RunOptions {
             no_page: false,
             output: None,
             save: None,
-            saves_once: false,
             force: ForceOption::default(),
-            common: CommonOptions::default(),
         }
     }
 }
 
-/// Options of Willmore flow.
+/// How Willmore flow goes: its time steps, the sizes that it holds, its energy.
 #[derive(Args, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "kebab-case")]
-pub struct FlowOptions {
+pub struct WillmoreOptions {
     /// Rule for the time steps, in lengths of the input to the fourth power [default: controlled]
     ///
     /// controlled: steps of second order, whose errors control their sizes. auto, auto:FIRST: steps that follow the energy. VALUE: equal steps.
@@ -338,21 +316,57 @@ pub struct FlowOptions {
     /// A sphere has 8 pi = 25.13, a circle of radius R has pi / R.
     #[arg(long, value_name = "W", value_parser = positive, help_heading = FLOW, hide_short_help = true)]
     pub energy: Option<f64>,
+}
 
-    /// The options that all jobs have.
+/// Options of Willmore flow.
+#[derive(Args, Serialize, Clone, Debug, Default)]
+pub struct FlowOptions {
+    /// The flow.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub willmore: WillmoreOptions,
+    /// The input.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub operator: OperatorOptions,
+    /// The run.
     #[command(flatten)]
     #[serde(flatten)]
     pub run: RunOptions,
+    /// Device and seed.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
 }
 
 /// Options of fairing.
 #[derive(Args, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "kebab-case")]
 pub struct FairOptions {
-    /// Those of the flow.
+    /// The flow.
     #[command(flatten)]
     #[serde(flatten)]
-    pub flow: FlowOptions,
+    pub willmore: WillmoreOptions,
+    /// The input.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub operator: OperatorOptions,
+    /// The run.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub run: RunOptions,
+    /// Device and seed.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
 
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
@@ -387,20 +401,31 @@ pub struct FairOptions {
     /// Format of the mesh in the run's folder [default: that of the input]
     #[arg(long, value_name = "NAME", value_parser = MESHES, help_heading = OUTPUT, hide_short_help = true)]
     pub format: Option<String>,
-
-    /// Whether an option other than --noise says when to stop.
-    #[arg(skip)]
-    #[serde(skip)]
-    pub ends: bool,
 }
 
 /// Options of inpainting.
 #[derive(Args, Serialize, Clone, Debug, Default)]
 pub struct InpaintOptions {
-    /// Those of the flow.
+    /// The flow.
     #[command(flatten)]
     #[serde(flatten)]
-    pub flow: FlowOptions,
+    pub willmore: WillmoreOptions,
+    /// The input.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub operator: OperatorOptions,
+    /// The run.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub run: RunOptions,
+    /// Device and seed.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
 
     /// The region that is filled: an image, box:x0,y0,x1,y1, or ball:x,y,r, in 3D with z
     ///
@@ -421,10 +446,34 @@ pub struct McfOptions {
     #[arg(long, value_name = "NAME", value_enum, default_value = "network", help_heading = FLOW)]
     pub method: Method,
 
-    /// The options that all jobs have.
+    /// The input.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub operator: OperatorOptions,
+    /// The run.
     #[command(flatten)]
     #[serde(flatten)]
     pub run: RunOptions,
+    /// Device and seed.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub common: CommonOptions,
+}
+
+impl Default for McfOptions {
+    fn default() -> Self {
+        Self {
+            method: Method::Hybrid,
+            input: InputOptions::default(),
+            operator: OperatorOptions::default(),
+            run: RunOptions::default(),
+            common: CommonOptions::default(),
+        }
+    }
 }
 
 /// Options of writing an input to a file.
@@ -479,7 +528,7 @@ impl InputOptions {
     }
 }
 
-impl RunOptions {
+impl FlowOptions {
     /// Of this input, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
@@ -489,21 +538,11 @@ impl RunOptions {
     }
 }
 
-impl FlowOptions {
-    /// Of this input, with the defaults of the program.
-    pub fn of(input: impl Into<Input>) -> Self {
-        Self {
-            run: RunOptions::of(input),
-            ..Self::default()
-        }
-    }
-}
-
 impl FairOptions {
     /// Of this mesh or segmentation, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
-            flow: FlowOptions::of(input),
+            input: InputOptions::of(input),
             ..Self::default()
         }
     }
@@ -513,7 +552,7 @@ impl InpaintOptions {
     /// Of this input and the region in it that is filled, with the defaults of the program.
     pub fn of(input: impl Into<Input>, mask: impl Into<String>) -> Self {
         Self {
-            flow: FlowOptions::of(input),
+            input: InputOptions::of(input),
             mask: Some(mask.into()),
             ..Self::default()
         }
@@ -524,8 +563,8 @@ impl McfOptions {
     /// Of this input, by the network, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
-            method: Method::Hybrid,
-            run: RunOptions::of(input),
+            input: InputOptions::of(input),
+            ..Self::default()
         }
     }
 }

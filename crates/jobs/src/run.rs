@@ -27,6 +27,9 @@ pub struct Plan<'a, const D: usize, O> {
     pub command: &'static str,
     pub presentation: O,
     pub options: RunOptions,
+    pub steps: usize,
+    /// The file to which the result goes besides.
+    pub save: Option<PathBuf>,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
     pub watcher: &'a dyn Watcher,
@@ -89,7 +92,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             ended: run.ended(),
             summary,
             page,
-            save: self.options.save.clone(),
+            save: self.save.clone(),
             seconds,
         })
     }
@@ -125,8 +128,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             bytes: run.case().bytes(stored),
         });
         let title = format!("{} of {}", self.command, run.case().shape);
-        let steps = self.options.steps.unwrap_or(0);
-        let progress = self.watcher.begins(&title, steps as u64);
+        let progress = self.watcher.begins(&title, self.steps as u64);
         let mut steps = Steps(&*progress);
         let mut pictures = Pictures {
             plan: self,
@@ -155,10 +157,10 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         self.write(run, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
             topology = presentation.topology(u, eps)?;
-            if let Some(path) = &self.options.save {
+            if let Some(path) = &self.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
-        } else if self.options.save.is_some() {
+        } else if self.save.is_some() {
             self.watcher.warning(&Warning::NothingSaved);
         }
         if self.options.frames.is_some() {

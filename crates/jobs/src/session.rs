@@ -7,7 +7,7 @@ use crate::input::{InitialShape, Loaded, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::notes::RunNotes;
-use crate::options::{ForceOption, McfOptions, RunOptions};
+use crate::options::{ForceOption, InputOptions, OperatorOptions};
 use crate::outcome::Outcome;
 use crate::paths::absolute;
 use crate::plane::Plane;
@@ -41,11 +41,11 @@ impl Job {
             Self::Flow(_) => (),
             Self::Fair(fair) => fair.check()?,
             Self::Inpaint(inpaint) => inpaint.check()?,
-            Self::Mcf(McfOptions { method, run }) => {
-                let options = &run.operator;
+            Self::Mcf(mcf) => {
+                let operator = &mcf.operator;
                 let chosen =
-                    options.network.is_some() || options.formulation != Formulation::Accurate;
-                if chosen && !method.is_learned() {
+                    operator.network.is_some() || operator.formulation != Formulation::Accurate;
+                if chosen && !mcf.method.is_learned() {
                     refuse!(
                         "`network` and `scheme` have no meaning for finite elements: leave them out, or choose `method` network"
                     );
@@ -53,19 +53,19 @@ impl Job {
             }
         }
         let usual = self.usual_rule(f64::NAN, f64::NAN);
-        let Some(flow) = self.willmore() else {
+        let Some(options) = self.willmore() else {
             return Ok(());
         };
-        if let Some(tolerance) = flow.tolerance
-            && flow.tau.unwrap_or(usual) != StepRule::Controlled
+        if let Some(tolerance) = options.tolerance
+            && options.tau.unwrap_or(usual) != StepRule::Controlled
         {
             refuse!(
                 "`tolerance` {tolerance} is for controlled time steps: give `tau` controlled, or leave it out"
             );
         }
-        let sizes = [flow.length, flow.area, flow.volume];
-        if let Some(ramp) = flow.ramp
-            && flow.reduced_volume.is_none()
+        let sizes = [options.length, options.area, options.volume];
+        if let Some(ramp) = options.ramp
+            && options.reduced_volume.is_none()
             && sizes.iter().all(Option::is_none)
         {
             refuse!(
@@ -76,15 +76,16 @@ impl Job {
     }
 }
 
-impl RunOptions {
-    /// Reads the input, for Willmore flow on a device.
+impl InputOptions {
+    /// Reads the input, for Willmore flow by an operator on a device.
     pub(crate) fn reader<'a>(
         &'a mut self,
+        operator: &OperatorOptions,
         device: DeviceKind,
         watcher: &'a dyn Watcher,
     ) -> Result<Reader<'a>> {
-        let mut reader = Reader::of(&mut self.input, self.operator.eps_over_h(), watcher)?;
-        let is_dense = self.operator.storage == Some(Storage::Dense);
+        let mut reader = Reader::of(self, operator.eps_over_h(), watcher)?;
+        let is_dense = operator.storage == Some(Storage::Dense);
         reader.whole = is_dense.then_some((device, Flow::Willmore));
         Ok(reader)
     }
@@ -95,7 +96,21 @@ impl RunOptions {
 /// # Errors
 /// Refused options or input; whatever stops a flow. [`Error::Interrupted`] is none of them: an interrupted run is an outcome without a summary.
 pub fn run_in_folder(job: Job, watcher: &dyn Watcher) -> Result<Outcome> {
-    let (session, loaded) = Session::load(job, watcher)?;
+    start(job, None, watcher)
+}
+
+/// Makes a run in a folder, and writes its result to this file in place of `save`. The folder does not name the file, so that a run that is
+/// resumed does not write it again.
+///
+/// # Errors
+/// As [`run_in_folder`].
+pub fn run_and_save(mut job: Job, file: &Path, watcher: &dyn Watcher) -> Result<Outcome> {
+    job.run().save = None;
+    start(job, Some(file), watcher)
+}
+
+fn start(job: Job, save: Option<&Path>, watcher: &dyn Watcher) -> Result<Outcome> {
+    let (session, loaded) = Session::load(job, save, watcher)?;
     match loaded {
         Loaded::Plane(start) => session.start(start),
         Loaded::Space(start) => session.start(start),
@@ -107,8 +122,8 @@ pub fn run_in_folder(job: Job, watcher: &dyn Watcher) -> Result<Outcome> {
 /// # Errors
 /// Refused options or input; whatever stops a flow; [`Error::Interrupted`].
 pub fn run_in_memory(mut job: Job, watcher: &dyn Watcher) -> Result<Results> {
-    job.options().save = None;
-    let (session, loaded) = Session::load(job, watcher)?;
+    job.run().save = None;
+    let (session, loaded) = Session::load(job, None, watcher)?;
     Ok(match loaded {
         Loaded::Plane(start) => Results::Plane(session.make(start)?),
         Loaded::Space(start) => Results::Space(session.make(start)?),
@@ -127,16 +142,16 @@ pub fn resume(
 ) -> Result<Outcome> {
     job.check()?;
     let usual = job.usual_steps();
-    let options = job.options();
+    let options = job.run();
     // A run that has gone on once notes its steps.
     let noted = RunNotes::of(&stored)?.steps;
-    options.steps = more.or(noted).or(options.steps).or(Some(usual));
+    let steps = more.or(noted).or(options.steps).unwrap_or(usual);
     // That its folder is gone is no reason not to go on with a run.
     let is_gone = |save: &mut PathBuf| !save.parent().is_some_and(Path::is_dir);
     if let Some(path) = options.save.take_if(is_gone) {
         watcher.warning(&Warning::FolderGone { path });
     }
-    let session = Session::new(job, watcher)?;
+    let session = Session::new(job, steps, None, watcher)?;
     match engine::dimension(&stored)? {
         2 => session.resume::<2, Plane>(stored, more),
         _ => session.resume::<3, Space>(stored, more),
@@ -145,42 +160,57 @@ pub fn resume(
 
 struct Session<'a> {
     job: Job,
+    /// The run has no more steps.
+    steps: usize,
+    /// The file to which the result goes besides.
+    save: Option<PathBuf>,
     device: ComputeDevice,
     watcher: &'a dyn Watcher,
 }
 
 impl<'a> Session<'a> {
-    fn new(mut job: Job, watcher: &'a dyn Watcher) -> Result<Self> {
-        let options = job.options();
+    /// Resolves the options. The result goes to the file of `save` unless there is another one.
+    fn new(
+        mut job: Job,
+        steps: usize,
+        save: Option<&Path>,
+        watcher: &'a dyn Watcher,
+    ) -> Result<Self> {
+        let options = job.groups();
         options.operator.fill_in()?;
-        if let Some(save) = &mut options.save {
+        if let Some(save) = &mut options.run.save {
             *save = absolute(&*save)?;
-            options.force.check(save)?;
+        }
+        let save = save.map(Path::to_owned).or(options.run.save.clone());
+        if let Some(save) = &save {
+            options.run.force.check(save)?;
         }
         let device = options.common.open_device()?;
         Ok(Self {
             job,
+            steps,
+            save,
             device,
             watcher,
         })
     }
 
     /// Reads the input.
-    fn load(mut job: Job, watcher: &'a dyn Watcher) -> Result<(Self, Loaded)> {
+    fn load(mut job: Job, save: Option<&Path>, watcher: &'a dyn Watcher) -> Result<(Self, Loaded)> {
         job.check()?;
-        let steps = job.usual_steps();
-        job.options().steps.get_or_insert(steps);
-        let mut session = Self::new(job, watcher)?;
+        let usual = job.usual_steps();
+        let steps = job.run().steps.unwrap_or(usual);
+        let mut session = Self::new(job, steps, save, watcher)?;
         let kind = session.device.kind();
         let loaded = match &mut session.job {
             Job::Fair(fair) => fair.load(kind, watcher),
             Job::Inpaint(inpaint) => inpaint.load(kind, watcher),
             Job::Mcf(mcf) => {
-                let mut reader = mcf.run.reader(kind, watcher)?;
+                let mut reader = mcf.input.reader(&mcf.operator, kind, watcher)?;
                 reader.whole = Some((kind, Flow::MeanCurvature));
                 reader.load()
             }
-            Job::Flow(flow) => flow.run.reader(kind, watcher)?.load(),
+            Job::Flow(flow) => flow.input.reader(&flow.operator, kind, watcher)?.load(),
         };
         Ok((session, loaded?))
     }
@@ -190,14 +220,14 @@ impl<'a> Session<'a> {
         &mut self,
         mut start: InitialShape<D, O>,
     ) -> Result<(Case<D>, O)> {
-        start.presentation.turn(&mut self.job.options().up)?;
+        start.presentation.turn(&mut self.job.run().up)?;
         if let Some(options) = self.job.willmore() {
             options.check_sizes::<D>(self.watcher)?;
         }
         if let Job::Flow(options) = &mut self.job {
             with_round_edges(options, &mut start.initial, &self.device, self.watcher)?;
         }
-        self.job.case(start)
+        self.job.case(start, self.steps)
     }
 
     fn make<const D: usize, O: Presentation<D>>(
@@ -213,8 +243,7 @@ impl<'a> Session<'a> {
         mut self,
         start: InitialShape<D, O>,
     ) -> Result<Outcome> {
-        let save = self.job.options().save.as_deref();
-        save.map_or(Ok(()), O::check_saved)?;
+        self.save.as_deref().map_or(Ok(()), O::check_saved)?;
         let (case, presentation) = self.prepare(start)?;
         let options = self.options_to_store()?;
         let plan = self.plan(presentation);
@@ -225,7 +254,7 @@ impl<'a> Session<'a> {
             None => free_folder(&format!("{}-{}", run.case().shape, plan.command)),
         };
         if plan.options.force.force {
-            make_way(&folder, &plan.options.input)?;
+            make_way(&folder, self.job.input())?;
         }
         let inputs = plan.presentation.inputs()?;
         let mut files = vec![(settings::FILE, options.as_bytes())];
@@ -237,13 +266,9 @@ impl<'a> Session<'a> {
     /// The options of which the same run can be made again.
     fn options_to_store(&self) -> Result<String> {
         let mut noted = self.job.clone();
-        if noted.options().saves_once {
-            noted.options().save = None;
-        }
         // Where the noise ends the flow, no steps were chosen, and to say so would be to choose.
-        if matches!(&noted, Job::Fair(fair) if !fair.ends) {
-            noted.options().steps = None;
-        }
+        let noise_ends = matches!(&noted, Job::Fair(fair) if !fair.says_when_to_end());
+        noted.run().steps = Some(self.steps).filter(|_| !noise_ends);
         settings::resolved(&noted)
     }
 
@@ -258,12 +283,13 @@ impl<'a> Session<'a> {
         let mut presentation: O = notes.presentation(&stored)?;
         let (initial, region) = engine::initial(&stored)?;
         presentation.restore(&stored)?;
-        let (case, presentation) = self.job.case(InitialShape {
+        let start = InitialShape {
             name,
             initial,
             presentation,
             region,
-        })?;
+        };
+        let (case, presentation) = self.job.case(start, self.steps)?;
         let plan = self.plan(presentation);
         let checkpoints = plan.checkpoints();
         let (store, run) = match more {
@@ -288,7 +314,9 @@ impl<'a> Session<'a> {
             command: self.job.name(),
             presentation,
             format,
-            options: self.job.options().clone(),
+            options: self.job.run().clone(),
+            steps: self.steps,
+            save: self.save.clone(),
             watcher: self.watcher,
         }
     }

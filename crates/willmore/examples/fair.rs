@@ -11,7 +11,7 @@ use willmore::prelude::*;
 pub fn take_off_noise(scan: &Path, smooth: &Path) -> Result<f64, JobError> {
     let mut options = FairOptions::of(scan);
     // A coarse grid, for an example of seconds; without it the grid is chosen.
-    options.flow.run.input.cells = Some(48);
+    options.input.cells = Some(48);
     let made = fair(options, &Silent)?;
     if let Some(shape) = &made.shape {
         shape.save(smooth)?;

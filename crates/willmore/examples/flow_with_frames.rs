@@ -23,7 +23,7 @@ impl Watcher for Printer {
 /// Those of the job.
 pub fn run(folder: &Path) -> Result<Outcome, JobError> {
     let mut options = FlowOptions::of("builtin:cross");
-    options.run.input.cells = Some(32);
+    options.input.cells = Some(32);
     options.run.steps = Some(4);
     options.run.frames = Some(2);
     options.run.output = Some(folder.to_owned());

@@ -10,8 +10,8 @@ use willmore::prelude::*;
 /// Those of the job.
 pub fn fill(drawing: &Path, region: &str, filled: &Path) -> Result<(), JobError> {
     let mut options = InpaintOptions::of(drawing, region);
-    options.flow.run.input.cells = Some(32);
-    options.flow.run.steps = Some(6);
+    options.input.cells = Some(32);
+    options.run.steps = Some(6);
     match inpaint(options, &Silent)?.shape() {
         Some(shape) => shape.save(filled),
         None => Ok(()),

@@ -24,7 +24,7 @@ pub fn organs() -> Result<Volume, Box<dyn std::error::Error>> {
 /// Those of the job.
 pub fn smooth_surfaces(segmentation: Input) -> Result<Vec<LabelSurface>, JobError> {
     let mut options = FairOptions::of(segmentation);
-    options.flow.run.input.cells = Some(32);
+    options.input.cells = Some(32);
     surfaces_of_labels(options, &Silent)
 }
 

@@ -8,11 +8,12 @@ use willmore::prelude::*;
 /// Those of the job.
 pub fn vesicle() -> Result<Results, JobError> {
     let mut options = FlowOptions::of("builtin:coin");
-    options.reduced_volume = Some(0.8);
-    options.ramp = Some(3);
-    options.tau = Some(StepRule::Constant(1e-5));
-    let grid = &mut options.run.input;
-    (grid.cells, grid.box_side, grid.side_length) = (Some(40), Some(1.2), Some(0.7));
+    options.willmore.reduced_volume = Some(0.8);
+    options.willmore.ramp = Some(3);
+    options.willmore.tau = Some(StepRule::Constant(1e-5));
+    options.input.cells = Some(40);
+    options.input.box_side = Some(1.2);
+    options.input.side_length = Some(0.7);
     options.run.steps = Some(3);
     flow(options, &Silent)
 }

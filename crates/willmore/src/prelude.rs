@@ -19,10 +19,10 @@ pub use geometry::{
 pub use jobs::Error as JobError;
 pub use jobs::values::{Amount, Ansatz, Label, SizeTarget};
 pub use jobs::{
-    FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions, Inside, Job,
-    LabelSurface, Made, McfOptions, MeshReport, Note, Outcome, Results, RunOptions, SampleOptions,
-    Shape, Silent, Summary, Warning, Watcher, fair, flow, inpaint, mcf, repair, run_in_folder,
-    run_in_memory, sample, surfaces_of_labels,
+    CommonOptions, FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions,
+    Inside, Job, LabelSurface, Made, McfOptions, MeshReport, Note, OperatorOptions, Outcome,
+    Results, RunOptions, SampleOptions, Shape, Silent, Summary, Warning, Watcher, WillmoreOptions,
+    fair, flow, inpaint, mcf, repair, run_in_folder, run_in_memory, sample, surfaces_of_labels,
 };
 pub use mean_curvature::{
     Calibration, Factors, Identity, MeanCurvatureStep, PhaseInverses, StepFailure, StepScales,

@@ -23,7 +23,7 @@ pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
         refuse!("{path} names no command that makes runs");
     };
     let mut job = command.job();
-    let stored_options = job.options();
+    let stored_options = job.run();
     // A run that was over may have written the file of --save itself.
     let notes = RunNotes::of(&stored)?;
     let was_over = stored.is_finished() || notes.was_over;

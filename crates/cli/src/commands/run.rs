@@ -1,27 +1,34 @@
 //! The commands that make runs.
 
+use std::path::Path;
+
 use jobs::Outcome;
 
 use super::labels;
 use crate::console::Console;
 use crate::error::{Error, Result};
 
-/// Makes a run, or one for each label of a volume.
-pub fn run(mut job: jobs::Job, console: &Console) -> Result<()> {
-    let input = job.options().input.clone();
+/// Makes a run, or one for each label of a volume. Its result goes to a file that stands for standard output, if there is one: the run does
+/// not name it.
+pub fn run(mut job: jobs::Job, output: Option<&Path>, console: &Console) -> Result<()> {
+    let input = job.input().clone();
     let of_label = |label| {
         let mut one = job.clone();
-        let options = one.options();
-        labels::choose(&mut options.input, label);
+        labels::choose(one.input(), label);
+        let options = one.run();
         for path in options.output.iter_mut().chain(&mut options.save) {
             labels::named(path, label);
         }
-        run(one, console)
+        run(one, None, console)
     };
     if labels::with_each(&input, console, of_label)? {
         return Ok(());
     }
-    tell(&jobs::run_in_folder(job, console)?, console)
+    let outcome = match output {
+        Some(file) => jobs::run_and_save(job, file, console)?,
+        None => jobs::run_in_folder(job, console)?,
+    };
+    tell(&outcome, console)
 }
 
 /// Prints what came out of a run.
@@ -39,7 +46,7 @@ pub fn tell(outcome: &Outcome, console: &Console) -> Result<()> {
     text.push(match (&outcome.summary, &outcome.page) {
         (None, _) => {
             // What was there already is to be written over by whoever goes on, too.
-            let saved = outcome.save.as_deref().is_some_and(std::path::Path::exists);
+            let saved = outcome.save.as_deref().is_some_and(Path::exists);
             let force = if saved { " --force" } else { "" };
             format!("interrupted, go on with: willmore resume {shown}{force}")
         }
