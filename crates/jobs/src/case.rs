@@ -233,7 +233,7 @@ impl WillmoreOptions {
             return Err(Error::foreign("length", "", "a surface in space"));
         }
         if D == 2 && self.area.is_some() && self.volume.is_some() {
-            refuse!("in the plane `volume` is another word for `area`: give one of them");
+            return Err(Refusal::AreaAndVolume.into());
         }
         if D == 2 && self.area.is_some() {
             watcher.note(&Note::AreaInThePlane);
@@ -323,15 +323,11 @@ pub fn with_round_edges<const D: usize>(
             *start = rounded;
         }
         None if holds_volume => {
-            let [boundary, inside] = if D == 2 {
-                ["length", "area"]
-            } else {
-                ["area", "volume"]
+            let [boundary, inside] = match D {
+                2 => ["length", "area"],
+                _ => ["area", "volume"],
             };
-            refuse!(
-                "{boundary} and {inside} cannot both be held: the grid does not resolve parts of the shape, and so their {boundary}; give more \
-                 `cells`, or hold one of them"
-            );
+            return Err(Refusal::BothSizes { boundary, inside }.into());
         }
         None => (),
     }

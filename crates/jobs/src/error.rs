@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::events::{Loss, ThinParts};
+use crate::refusal::Refusal;
 
 /// What can fail as a job does, unless it says otherwise.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -39,8 +40,8 @@ pub enum Error {
         what: &'static str,
     },
     /// Options that contradict each other, or do not fit the input.
-    #[error("{0}")]
-    Options(String),
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// A grid that resolves nothing.
     #[error("`cells` {cells} resolves nothing: use at least {fewest} per unit length")]
     TooFewCells {
@@ -168,6 +169,23 @@ pub enum Error {
         "{0} is in the folder of `output`, which `force` would remove: copy it elsewhere, or give another `output`"
     )]
     InputInTheRun(String),
+    /// The options of a run that cannot be stored, such as paths that are no text.
+    #[error("the options cannot be stored: {0}")]
+    UnwritableOptions(toml::ser::Error),
+    /// A run with the notes of another program.
+    #[error("{} cannot be resumed: {reason}; start a new run", path.display())]
+    OtherNotes {
+        /// The folder of the run.
+        path: PathBuf,
+        /// What is wrong with the notes.
+        reason: serde_json::Error,
+    },
+    /// The outcome in the folder of a run is none.
+    #[error("the stored outcome: {0}")]
+    StoredOutcome(serde_json::Error),
+    /// The options in the folder of a run are none.
+    #[error("the stored options: {0}")]
+    StoredOptions(toml::de::Error),
     /// The flow was interrupted.
     #[error("interrupted")]
     Interrupted,
@@ -230,14 +248,6 @@ fn or_allow_loss(may_allow: bool) -> &'static str {
     if may_allow { " or `allow_loss`" } else { "" }
 }
 
-/// Returns [`Error::Options`] with a message that is given as to `format!`.
-macro_rules! refuse {
-    ($($message:tt)*) => {
-        return Err($crate::error::Error::Options(format!($($message)*)))
-    };
-}
-pub(crate) use refuse;
-
 impl From<engine::Error> for Error {
     fn from(error: engine::Error) -> Self {
         match error {
@@ -248,10 +258,6 @@ impl From<engine::Error> for Error {
 }
 
 impl Error {
-    pub(crate) fn options(message: impl Into<String>) -> Self {
-        Self::Options(message.into())
-    }
-
     pub(crate) fn foreign(
         option: &'static str,
         value: impl fmt::Display,

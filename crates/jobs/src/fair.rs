@@ -37,13 +37,10 @@ impl FairOptions {
 
     pub(crate) fn check(&self) -> Result<()> {
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
-            refuse!("`energy_ratio` {ratio} is reached before the first step: give a part below 1");
+            return Err(Refusal::EnergyRatio(ratio).into());
         }
         if let Some(energy) = self.willmore.energy.filter(|energy| *energy < BALL) {
-            refuse!(
-                "`energy` {energy} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
-                 off the noise, or give `energy_ratio` 0.5 for half the energy that there is"
-            );
+            return Err(Refusal::EnergyOfBall(energy).into());
         }
         Ok(())
     }
@@ -75,17 +72,12 @@ impl FairOptions {
                 loaded
             }
             _ if self.noise.is_some() || self.keep.is_some() || !ends => {
-                refuse!(
-                    "only a mesh in a file has noise to take off: say how smooth the surface is to become, by `energy_ratio`, `time`, \
-                     `energy` or `steps`, without `noise` and `keep`",
-                );
+                return Err(Refusal::NoiseOfNoMesh.into());
             }
             _ => reader.load()?,
         };
         if let Loaded::Plane(_) = loaded {
-            refuse!(
-                "`fair` is for surfaces in space; for images and shapes in the plane there is `willmore flow`"
-            );
+            return Err(Refusal::FairInPlane.into());
         }
         Ok(loaded)
     }
@@ -98,9 +90,7 @@ impl FairOptions {
     ) -> Result<Loaded> {
         let (path, repairs) = (&file.path, self.input.repair);
         if repairs && !self.remesh {
-            refuse!(
-                "`repair` makes a new mesh: write it by `willmore sample --repair --save`, which can then be faired, or give `remesh`",
-            );
+            return Err(Refusal::RepairWithoutRemesh.into());
         }
         if let Some(mask) = self.keep.as_deref().and_then(keep::mask) {
             self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
@@ -130,18 +120,12 @@ impl FairOptions {
             });
         }
         if own.fairing().noise > 0.0 && own.drives_volume {
-            refuse!(
-                "the volume stays where noise is taken off: leave out `volume` and `reduced_volume`, or `noise` and say how smooth the surface is \
-                 to become, by `energy_ratio`, `time`, `energy` or `steps`"
-            );
+            return Err(Refusal::NoiseAndVolume.into());
         }
         if noise.is_none() {
             let noise = own.fairing().noise;
             if noise == 0.0 {
-                refuse!(
-                    "the mesh has no noise that could be estimated: give `noise` LENGTH, or say how smooth the surface is to become, by \
-                     `energy_ratio`, `time`, `energy` or `steps`"
-                );
+                return Err(Refusal::NoNoise.into());
             }
             watcher.note(&Note::Noise {
                 noise,

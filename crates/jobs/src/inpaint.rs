@@ -7,7 +7,7 @@ use crate::values::Ansatz;
 impl InpaintOptions {
     pub(crate) fn check(&mut self) -> Result<()> {
         let Some(mask) = &self.mask else {
-            refuse!("say which region to fill: `mask` IMAGE, box:x0,y0,x1,y1 or ball:x,y,r");
+            return Err(Refusal::NoMask.into());
         };
         if !Region::is_meant(mask) {
             let absolute = absolute(mask)?;
@@ -45,12 +45,12 @@ impl InpaintOptions {
         let inside = |node: usize| mask.signed_distance(grid.node(node)) < 0.0;
         let region: NodeSet = (0..grid.len()).map(inside).collect();
         if region.is_empty() {
-            refuse!(
-                "`mask` {} contains no node of the box from {:?} of side {}: nothing could move",
-                self.mask.as_deref().unwrap_or_default(),
-                grid.origin(),
-                grid.side()
-            );
+            return Err(Refusal::MaskWithoutNodes {
+                mask: self.mask.clone().unwrap_or_default(),
+                origin: grid.origin().to_vec(),
+                side: grid.side(),
+            }
+            .into());
         }
         let eps = self.operator.eps_over_h() * grid.spacing();
         let inner = match &self.ansatz {
@@ -71,10 +71,16 @@ impl InpaintOptions {
 /// A region that is a mask.
 fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>> {
     if !Region::is_meant(mask) {
-        refuse!("`mask` {mask} is no region in {D}D: give box:... or ball:...");
+        return Err(Refusal::MaskOfImage {
+            mask: mask.to_owned(),
+            dimension: D,
+        }
+        .into());
     }
-    let region: Region = mask
-        .parse()
-        .map_err(|reason| Error::options(format!("`mask`: {reason}")))?;
+    let region: Region = mask.parse().map_err(|reason| Refusal::Value {
+        option: "mask",
+        value: None,
+        reason,
+    })?;
     Ok(region.shape::<D>()?)
 }

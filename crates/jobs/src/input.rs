@@ -133,7 +133,7 @@ pub fn closed(file: &File, repairs: bool, watcher: &dyn Watcher) -> Result<Close
 pub fn repaired(input: &Input) -> Result<Repaired> {
     match Source::of(input)? {
         Source::Mesh(file) => Ok(surfaces::repair(&file.mesh()?, REPAIR_CELLS)?),
-        _ => refuse!("only meshes are repaired, and {input} is none"),
+        _ => Err(Refusal::NotRepaired(input.to_string()).into()),
     }
 }
 
@@ -144,7 +144,7 @@ impl Source {
             return Ok(Self::BuiltIn(built_in.to_owned()));
         }
         if !input.is_in_memory() && Region::is_meant(name) {
-            return Ok(Self::Region(name.parse().map_err(Error::Options)?));
+            return Ok(Self::Region(name.parse().map_err(Refusal::Region)?));
         }
         let file = input.file()?;
         Ok(match &*file.extension() {

@@ -20,16 +20,20 @@ pub fn parse(
     bytes: &[u8],
     file: &str,
 ) -> Result<Box<dyn SignedDistance<3>>> {
-    let wrong = |reason: String| Error::options(format!("`keep` {text}: {reason}"));
+    let wrong = |reason| Refusal::Value {
+        option: "keep",
+        value: Some(text.to_owned()),
+        reason,
+    };
     if let Some(colour) = text.strip_prefix("colour:") {
         let digits = colour.strip_prefix('#').unwrap_or(colour);
         let value = u32::from_str_radix(digits, 16).ok();
         let Some(value) = value.filter(|_| digits.len() == 6) else {
-            refuse!("`keep` {text}: give six hexadecimal digits, as colour:ff0000");
+            return Err(Refusal::KeepColour(text.to_owned()).into());
         };
         let [_, colour @ ..] = value.to_be_bytes();
         let Some(colours) = surfaces::vertex_colours(bytes, file)? else {
-            refuse!("`keep` colour:... needs a mesh whose vertices have colours, in PLY or OBJ");
+            return Err(Refusal::KeepWithoutColours.into());
         };
         let vertices = mesh.vertices.iter().copied().zip(colours);
         let (kept, others): (Vec<_>, Vec<_>) = vertices.partition(|(_, of)| *of == colour);

@@ -44,6 +44,7 @@ pub mod paths;
 mod plane;
 mod prelude;
 mod presentation;
+mod refusal;
 mod run;
 mod sample;
 mod session;
@@ -70,6 +71,7 @@ pub use options::{
 pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
 pub use presentation::Topology;
+pub use refusal::Refusal;
 pub use sample::sample;
 pub use session::{resume, run_and_save, run_in_folder, run_in_memory};
 pub use volume::{labels, named};

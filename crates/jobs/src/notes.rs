@@ -47,10 +47,8 @@ pub struct NetworkNote {
 
 fn parsed<T: DeserializeOwned>(value: &Value, stored: &StoredRun) -> Result<T> {
     T::deserialize(value).map_err(|reason| {
-        let path = stored.path().display();
-        Error::options(format!(
-            "{path} cannot be resumed: {reason}; start a new run"
-        ))
+        let path = stored.path().to_owned();
+        Error::OtherNotes { path, reason }
     })
 }
 

@@ -100,15 +100,15 @@ impl OwnMesh {
         let fairing = Fairing::new(closed, self.noise, stays);
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
-            refuse!("`keep` contains all of the mesh: nothing could move");
+            return Err(Refusal::KeepsAll.into());
         }
         if keep.is_some() && kept == 0 {
             let bounds = fairing.rough.bounding_box();
-            refuse!(
-                "`keep` contains no vertex of the mesh, which goes from {:?} to {:?}",
-                bounds.lower,
-                bounds.upper
-            );
+            return Err(Refusal::KeepsNothing {
+                lower: bounds.lower,
+                upper: bounds.upper,
+            }
+            .into());
         }
         self.loaded = Some(Box::new(Loaded {
             bytes,
@@ -144,11 +144,11 @@ impl OwnMesh {
             return Ok(());
         }
         match surfaces::rewrite(bytes, path, mesh) {
-            Err(surfaces::Error::Format { problem, .. }) => refuse!(
-                "the vertices of {} cannot be moved: {problem}; write it anew by `willmore sample --save`, which can then be faired, or give \
-                 `remesh`",
-                path.display()
-            ),
+            Err(surfaces::Error::Format { problem, .. }) => Err(Refusal::NotMovable {
+                path: path.to_owned(),
+                problem,
+            }
+            .into()),
             Err(other) => Err(Error::mesh(other)),
             Ok(_) => Ok(()),
         }

@@ -52,7 +52,7 @@ impl Files<'_> {
         let outcome: Option<Summary> = (self.read(presentation::SUMMARY)?)
             .map(|bytes| serde_json::from_slice(&bytes))
             .transpose()
-            .map_err(|error| Error::options(format!("the stored outcome: {error}")))?;
+            .map_err(Error::StoredOutcome)?;
         let mut page = Page::new(format!("willmore {} {}", about.command, about.name))
             .with_lead(self.lead(outcome.as_ref()));
         if let Some(shape) = self.shape()? {
@@ -61,8 +61,8 @@ impl Files<'_> {
         if !self.records.is_empty() {
             page = page.with(self.steps()?);
         }
-        let options: Value = toml::from_str(&self.run.read_text(settings::FILE)?)
-            .map_err(|error| Error::options(format!("the stored options: {error}")))?;
+        let options: Value =
+            toml::from_str(&self.run.read_text(settings::FILE)?).map_err(Error::StoredOptions)?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
             let dimension = engine::dimension(self.run)?;

@@ -52,16 +52,21 @@ impl Plane {
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
     pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>> {
         let image = images::read(mask)?;
-        let ([width, height], [w, h]) = (image.size(), self.frame.size());
-        if self.image.is_some() && [width, height] != [w, h] {
-            refuse!(
-                "`mask` {mask} has {width} x {height} pixels; it must have {w} x {h}, as the input"
-            );
+        let (size, of_input) = (image.size(), self.frame.size());
+        if self.image.is_some() && size != of_input {
+            return Err(Refusal::MaskSize {
+                mask: mask.to_owned(),
+                size,
+                of_input,
+            }
+            .into());
         }
-        if self.image.is_none() && width != height {
-            refuse!(
-                "`mask` {mask} has {width} x {height} pixels; it must be a square, which fills the box"
-            );
+        if self.image.is_none() && size[0] != size[1] {
+            return Err(Refusal::MaskNotSquare {
+                mask: mask.to_owned(),
+                size,
+            }
+            .into());
         }
         let side = Side::of(&image, 0.5)?;
         let mut outline = Outline::of_image(&image, side)?;
@@ -89,10 +94,7 @@ impl Plane {
         };
         let drawn: Vec<bool> = (0..picture.pixels().len()).map(is_inside).collect();
         if !drawn.contains(&true) {
-            refuse!(
-                "`mask` contains no pixel of {}: nothing would be drawn",
-                path.display()
-            );
+            return Err(Refusal::MaskWithoutPixels(path.clone()).into());
         }
         self.original = Some(Original { picture, drawn });
         Ok(())

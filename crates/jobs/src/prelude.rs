@@ -17,5 +17,6 @@ pub(crate) use serde_json::{Value, json};
 pub(crate) use surfaces::shapes::Region;
 pub(crate) use surfaces::{ClosedMesh, Fairing, MeshDistance, TriangleMesh};
 
-pub(crate) use crate::error::{Error, Result, refuse};
+pub(crate) use crate::error::{Error, Result};
 pub(crate) use crate::events::{Note, Warning, Watcher};
+pub(crate) use crate::refusal::Refusal;

@@ -61,21 +61,17 @@ pub fn sample(mut options: SampleOptions, watcher: &dyn Watcher) -> Result<()> {
 /// Refuses what cannot be written, and says whether it is a mesh.
 fn check(options: &SampleOptions) -> Result<bool> {
     let (path, noise) = (&options.save, options.noise);
-    let (format, shown) = (extension(path), path.display());
+    let format = extension(path);
     let is_mesh = MESHES.contains(&&*format);
     if !is_mesh && !OTHERS.contains(&&*format) {
-        refuse!(
-            "`save` {shown} must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz"
-        );
+        return Err(Refusal::SampleFormat(path.clone()).into());
     }
     options.force.check(path)?;
     if !(noise.is_finite() && noise >= 0.0) {
-        refuse!("`noise` {noise} must not be negative");
+        return Err(Refusal::NegativeNoise(noise).into());
     }
     if noise > 0.0 && !is_mesh {
-        refuse!(
-            "`noise` moves the vertices of meshes: leave it out, or save a mesh in place of {shown}"
-        );
+        return Err(Refusal::NoiseInNoMesh(path.clone()).into());
     }
     Ok(is_mesh)
 }
@@ -115,7 +111,11 @@ fn write<const D: usize, O: Presentation<D>>(
 fn segmentation<const D: usize>(u: &Field<D>, path: &Path) -> Result<Volume> {
     let grid = u.grid();
     let Ok(origin) = <[f64; 3]>::try_from(&grid.origin()[..]) else {
-        refuse!("`save` {}: a shape in {D}D has no voxels", path.display());
+        return Err(Refusal::NoVoxels {
+            path: path.to_owned(),
+            dimension: D,
+        }
+        .into());
     };
     let cells = grid.cells();
     // The first axis runs fastest.

@@ -46,9 +46,7 @@ impl Job {
                 let chosen =
                     operator.network.is_some() || operator.formulation != Formulation::Accurate;
                 if chosen && !mcf.method.is_learned() {
-                    refuse!(
-                        "`network` and `scheme` have no meaning for finite elements: leave them out, or choose `method` network"
-                    );
+                    return Err(Refusal::FiniteElements.into());
                 }
             }
         }
@@ -59,18 +57,14 @@ impl Job {
         if let Some(tolerance) = options.tolerance
             && options.tau.unwrap_or(usual) != StepRule::Controlled
         {
-            refuse!(
-                "`tolerance` {tolerance} is for controlled time steps: give `tau` controlled, or leave it out"
-            );
+            return Err(Refusal::Tolerance(tolerance).into());
         }
         let sizes = [options.length, options.area, options.volume];
         if let Some(ramp) = options.ramp
             && options.reduced_volume.is_none()
             && sizes.iter().all(Option::is_none)
         {
-            refuse!(
-                "`ramp` {ramp} is for sizes that go to a target: give `length`, `area`, `volume` or `reduced_volume`, or leave it out"
-            );
+            return Err(Refusal::Ramp(ramp).into());
         }
         Ok(())
     }

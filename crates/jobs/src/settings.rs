@@ -13,7 +13,6 @@ pub const COMMAND: &str = "command";
 /// # Errors
 /// Options that TOML cannot hold, such as paths that are no text.
 pub fn resolved(job: &Job) -> Result<String> {
-    let unwritable = |error| Error::options(format!("the options cannot be stored: {error}"));
-    let options = toml::to_string(job).map_err(unwritable)?;
+    let options = toml::to_string(job).map_err(Error::UnwritableOptions)?;
     Ok(format!("{COMMAND} = {:?}\n{options}", job.name()))
 }

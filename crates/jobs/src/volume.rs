@@ -14,9 +14,7 @@ pub(crate) fn body(file: &File, options: &InputOptions) -> Result<Body> {
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
-            refuse!(
-                "`label` all makes a surface of each label, and this job takes one: give its number",
-            );
+            return Err(Refusal::AllLabels.into());
         }
         (None, Some(threshold)) => Inside::Above(threshold),
         (None, None) => usual(&volume, &file.path)?,
@@ -26,22 +24,26 @@ pub(crate) fn body(file: &File, options: &InputOptions) -> Result<Body> {
 
 /// The larger one of two values.
 fn usual(volume: &Volume, path: &Path) -> Result<Inside> {
-    let [low, high] = volume.range();
-    let found = match volume.labels().as_deref() {
+    let path = path.to_owned();
+    let refusal = match volume.labels().as_deref() {
         Some([_, (label, _)]) => return Ok(Inside::Label(*label)),
-        Some(labels) if labels.len() > 2 => {
-            let listed = labels.iter().take(LISTED);
-            let listed: Vec<String> = listed.map(|(label, _)| label.to_string()).collect();
-            let more = if labels.len() > LISTED { ", ..." } else { "" };
-            let listed = listed.join(", ");
-            format!("the values {listed}{more}: give `label` N of one of them, `label` all")
+        Some(labels) if labels.len() > 2 => Refusal::SeveralLabels {
+            path,
+            first: (labels.iter().take(LISTED))
+                .map(|(label, _)| *label)
+                .collect(),
+            more: labels.len() > LISTED,
+        },
+        _ => {
+            let [lowest, highest] = volume.range();
+            Refusal::NoThreshold {
+                path,
+                lowest,
+                highest,
+            }
         }
-        _ => format!("values from {low} to {high}: give `label` N"),
     };
-    refuse!(
-        "{} holds {found}, or `threshold` VALUE, above which is inside",
-        path.display()
-    )
+    Err(refusal.into())
 }
 
 /// The labels of a volume but 0, of which there must be some, if all of them are to become surfaces.
@@ -57,10 +59,7 @@ pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
-        refuse!(
-            "{} holds no labels, which are whole numbers other than 0: give `threshold` VALUE, above which is inside",
-            file.path.display()
-        );
+        return Err(Refusal::NoLabels(file.path).into());
     }
     Ok(Some(labels))
 }
