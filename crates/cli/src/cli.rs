@@ -6,8 +6,8 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use jobs::values::count;
 use jobs::{
-    CommonOptions, FairOptions, FlowOptions, ForceOption, InpaintOptions, InputOptions, McfOptions,
-    OperatorOptions, RunOptions, SampleOptions,
+    CheckOptions, FairOptions, FlowOptions, ForceOption, InpaintOptions, InputOptions, McfOptions,
+    RunOptions, SampleOptions, TrainOptions,
 };
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
@@ -172,49 +172,6 @@ pub enum NetworksCommand {
         /// Name in the list, or a file
         network: String,
     },
-}
-
-#[derive(Args, Clone, Debug)]
-pub struct CheckOptions {
-    #[command(flatten)]
-    pub input: InputOptions,
-    #[command(flatten)]
-    pub operator: OperatorOptions,
-    #[command(flatten)]
-    pub common: CommonOptions,
-}
-
-#[derive(Args, Clone, Debug)]
-pub struct TrainOptions {
-    /// Dimension of space, 2 or 3; required, like --width, --eps-over-h and --save
-    #[arg(long, value_name = "D")]
-    pub dimension: Option<usize>,
-
-    /// Width of the kernel in cells, odd
-    #[arg(long, value_name = "CELLS")]
-    pub width: Option<usize>,
-
-    /// Interface width in cells
-    #[arg(long, value_name = "RATIO")]
-    pub eps_over_h: Option<f64>,
-
-    /// Time step of the mean curvature flow in cells squared [default: (eps/h)^2/4, what the other commands need]
-    #[arg(long, value_name = "RATIO")]
-    pub step_over_h2: Option<f64>,
-
-    /// The file to write, .safetensors
-    #[arg(long, value_name = "FILE")]
-    pub save: Option<PathBuf>,
-
-    /// A network of seconds, for trying out the command
-    #[arg(long)]
-    pub quick: bool,
-
-    #[command(flatten)]
-    pub force: ForceOption,
-
-    #[command(flatten)]
-    pub common: CommonOptions,
 }
 
 impl RunCommand {

@@ -131,6 +131,10 @@ struct Bar {
 }
 
 impl Progress for Bar {
+    fn expect(&self, parts: u64) {
+        self.bar.set_length(parts);
+    }
+
     fn reach(&self, parts: u64) {
         self.bar.set_position(parts);
     }

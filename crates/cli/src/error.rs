@@ -21,16 +21,10 @@ pub enum Error {
     Engine(#[from] engine::Error),
     /// From reading and writing files.
     Files(#[from] files::Error),
-    /// From grids and shapes.
-    Geometry(#[from] geometry::Error),
     /// From networks.
     Model(#[from] model::Error),
-    /// From devices.
-    Operators(#[from] operators::Error),
     /// From the folders of runs.
     Runs(#[from] runs::Error),
-    /// From time steps.
-    Solver(#[from] solver::Error),
 }
 
 /// Returns [`Error::Options`] with a message that is given as to `format!`.

@@ -28,9 +28,7 @@ pub fn main(arguments: &[OsString], mut console: Console) -> u8 {
     };
     match done {
         Ok(()) => 0,
-        Err(Error::Interrupted | Error::Model(model::Error::Interrupted { .. })) => {
-            Interrupt::EXIT_CODE
-        }
+        Err(Error::Interrupted) => Interrupt::EXIT_CODE,
         Err(error) => {
             console.fail(&files::with_causes(&error));
             FAILURE

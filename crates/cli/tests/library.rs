@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use jobs::{CheckOptions, Refusal, TrainOptions};
 use willmore::prelude::*;
 
 use crate::common::outcome;
@@ -120,4 +121,43 @@ fn a_run_with_frames_is_that_of_the_program() {
             assert!(library[name] == *bytes, "{} differs", name.display());
         }
     }
+}
+
+#[test]
+fn checks_are_those_of_the_program() {
+    let mut options = CheckOptions::of("builtin:cross");
+    options.input.cells = Some(32);
+    let checked = jobs::check(options, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let printed = program(folder.path(), "check builtin:cross --cells 32");
+    assert_eq!(printed["device"], checked.device.name());
+    let printed = printed["checks"].as_array().unwrap();
+    assert_eq!(printed.len(), checked.findings.len());
+    for (printed, finding) in printed.iter().zip(&checked.findings) {
+        assert_eq!(printed["name"], finding.check.name());
+        assert_eq!(printed["found"].as_f64(), finding.found);
+        assert!(finding.passed && printed["passed"] == true, "{finding}");
+    }
+}
+
+#[test]
+fn refusals_carry_their_numbers() {
+    let mut options = FlowOptions::of("builtin:disc");
+    options.willmore.ramp = Some(3);
+    let refused = flow(options, &Silent);
+    assert!(matches!(refused, Err(JobError::Refused(Refusal::Ramp(3)))));
+    let mut options = FairOptions::of("builtin:sphere");
+    options.energy_ratio = Some(2.0);
+    let refused = fair(options, &Silent);
+    assert!(matches!(
+        refused,
+        Err(JobError::Refused(Refusal::EnergyRatio(2.0)))
+    ));
+    let refused = jobs::train(TrainOptions::default(), &Silent);
+    assert!(matches!(
+        refused,
+        Err(JobError::Refused(Refusal::TrainNeeds {
+            option: "eps_over_h"
+        }))
+    ));
 }

@@ -37,6 +37,8 @@ impl Watcher for Silent {}
 
 /// How far long work is; it is over when this is dropped.
 pub trait Progress: Sync {
+    /// There are so many parts, as is found out only now.
+    fn expect(&self, _parts: u64) {}
     /// So many parts are done.
     fn reach(&self, parts: u64);
     /// One more is.

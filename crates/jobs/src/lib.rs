@@ -19,11 +19,13 @@
 //!
 //! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a
 //! run in a folder, with pictures and a page, and [`resume`] continues it. [`open`] is the way from an input to a phase field on a good grid.
+//! [`check`] checks derivatives there, and [`train`] makes networks for other ratios.
 //!
 //! Nothing is printed. A [`Watcher`] hears [warnings](Warning) and [notes](Note) as values with their numbers, follows the progress, and can interrupt.
 //! Messages name options in backticks, as `cells`: a program can show them as it spells them.
 
 mod case;
+mod check;
 mod error;
 mod events;
 mod fair;
@@ -50,11 +52,13 @@ mod sample;
 mod session;
 pub mod settings;
 mod space;
+mod train;
 pub mod values;
 mod volume;
 mod words;
 
 pub use case::check_eps_over_h;
+pub use check::{Check, Checked, Finding, check};
 pub use error::{Error, Result};
 pub use events::{GridDistance, Loss, Note, Progress, Silent, ThinParts, Warning, Watcher};
 pub use faired::MeshReport;
@@ -65,8 +69,9 @@ pub use job::Job;
 pub use made::{Curve, Made, MeshFile, Results, Shape, Surface};
 pub use notes::{About, NetworkNote, RunNotes};
 pub use options::{
-    CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions, InputOptions,
-    Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions, WillmoreOptions,
+    CheckOptions, CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions,
+    InputOptions, Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions, TrainOptions,
+    WillmoreOptions,
 };
 pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
@@ -74,4 +79,5 @@ pub use presentation::Topology;
 pub use refusal::Refusal;
 pub use sample::sample;
 pub use session::{resume, run_and_save, run_in_folder, run_in_memory};
+pub use train::{TrainedNetwork, train};
 pub use volume::{labels, named};

@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use engine::Storage;
+use model::Ratios;
 
 use crate::file::Input;
 use crate::paths::MESHES;
@@ -518,6 +519,56 @@ pub struct SampleOptions {
     pub force: ForceOption,
 }
 
+/// Options of checking derivatives and device.
+#[derive(Args, Clone, Debug, Default)]
+pub struct CheckOptions {
+    /// The input.
+    #[command(flatten)]
+    pub input: InputOptions,
+    /// The operator.
+    #[command(flatten)]
+    pub operator: OperatorOptions,
+    /// Device and seed.
+    #[command(flatten)]
+    pub common: CommonOptions,
+}
+
+/// Options of training a network.
+#[derive(Args, Clone, Debug, Default)]
+pub struct TrainOptions {
+    /// Dimension of space, 2 or 3; required, like --width, --eps-over-h and --save
+    #[arg(long, value_name = "D")]
+    pub dimension: Option<usize>,
+
+    /// Width of the kernel in cells, odd
+    #[arg(long, value_name = "CELLS")]
+    pub width: Option<usize>,
+
+    /// Interface width in cells
+    #[arg(long, value_name = "RATIO")]
+    pub eps_over_h: Option<f64>,
+
+    /// Time step of the mean curvature flow in cells squared [default: (eps/h)^2/4, what the other commands need]
+    #[arg(long, value_name = "RATIO")]
+    pub step_over_h2: Option<f64>,
+
+    /// The file to write, .safetensors
+    #[arg(long, value_name = "FILE")]
+    pub save: Option<PathBuf>,
+
+    /// A network of seconds, for trying out the command
+    #[arg(long)]
+    pub quick: bool,
+
+    /// Whether files are written over.
+    #[command(flatten)]
+    pub force: ForceOption,
+
+    /// Device and seed.
+    #[command(flatten)]
+    pub common: CommonOptions,
+}
+
 impl InputOptions {
     /// Of this input, with all that is left to it.
     pub fn of(input: impl Into<Input>) -> Self {
@@ -581,6 +632,30 @@ impl SampleOptions {
             resample: false,
             up: None,
             force: ForceOption::default(),
+        }
+    }
+}
+
+impl CheckOptions {
+    /// At this input, with the defaults of the program.
+    pub fn of(input: impl Into<Input>) -> Self {
+        Self {
+            input: InputOptions::of(input),
+            ..Self::default()
+        }
+    }
+}
+
+impl TrainOptions {
+    /// For these ratios, to this file, with the defaults of the program.
+    pub fn of(ratios: Ratios, save: impl Into<PathBuf>) -> Self {
+        Self {
+            dimension: Some(ratios.dimension),
+            width: Some(ratios.width),
+            eps_over_h: Some(ratios.eps_over_h),
+            step_over_h2: Some(ratios.step_over_h2),
+            save: Some(save.into()),
+            ..Self::default()
         }
     }
 }

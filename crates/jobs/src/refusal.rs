@@ -208,6 +208,15 @@ pub enum Refusal {
     )]
     NoLabels(PathBuf),
 
+    /// No value of an option without which nothing is trained.
+    #[error(
+        "train needs `{option}`; for example: willmore train --dimension 2 --width 25 --eps-over-h 3 --save mine.safetensors"
+    )]
+    TrainNeeds {
+        /// The option.
+        option: &'static str,
+    },
+
     /// A file for an input whose extension says nothing.
     #[error(
         "`save` {} must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
