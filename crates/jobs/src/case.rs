@@ -280,15 +280,12 @@ impl WillmoreOptions {
 /// # Errors
 /// With the volume held, where edges cannot be made round.
 pub fn with_round_edges<const D: usize>(
-    FlowOptions {
-        willmore: options,
-        operator,
-        ..
-    }: &mut FlowOptions,
+    options: &mut FlowOptions,
     start: &mut Stored<D>,
     device: &ComputeDevice,
     watcher: &dyn Watcher,
 ) -> Result<()> {
+    let (options, operator) = (&mut options.willmore, &options.operator);
     let wanted = options.size_targets::<D>();
     if wanted.perimeter.is_none() && options.reduced_volume.is_none() {
         return Ok(());
