@@ -10,13 +10,14 @@ use jobs::{
     RunOptions, SampleOptions, TrainOptions,
 };
 
-const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, one line on standard error; 130 interrupted (Ctrl-C): \
-of a run the last step was finished and stored, and `willmore resume` goes on.";
+const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, with one line on standard error; 130 interrupted (Ctrl-C). \
+An interrupted run first finishes its step and stores it. `willmore resume` continues the run.";
 
 /// Willmore flow of meshes, images and fields.
 ///
-/// Surfaces and curves are made smooth by the gradient flow of their bending energy, with the hybrid scheme of Rumpf, Sassen
-/// and Norden-Smoch: a learned step of mean curvature flow inside a minimizing movement.
+/// Willmore flow lowers the bending energy of surfaces and curves, and so makes them smooth. The program computes it by the hybrid scheme of Rumpf,
+/// Sassen and Norden-Smoch: each time step minimizes an energy, and the curvature in this energy comes from a short, learned step of mean curvature
+/// flow.
 #[derive(Parser, Debug)]
 #[command(name = "willmore", version, after_help = EXIT_CODES, max_term_width = 120)]
 #[command(args_override_self = true, disable_help_subcommand = true)]
@@ -32,12 +33,12 @@ pub struct Cli {
 pub enum Command {
     #[command(flatten)]
     Run(RunCommand),
-    /// Continue an interrupted run, to the same final bytes as if it had not been interrupted
+    /// Continue an interrupted run; its files become the same as without the interruption
     #[command(after_help = "Examples:
   willmore resume runs/bunny
   willmore resume runs/bunny --steps 40")]
     Resume(ResumeOptions),
-    /// Write a built-in shape or another input to a file, possibly with noise and holes: something to try the program on
+    /// Write a built-in shape or another input to a file, also with noise or holes, to try the program
     #[command(after_help = "Examples:
   willmore sample builtin:figure --noise 0.005 --save scan.ply
   willmore sample builtin:ring --without ball:0.4,0.2,0.1 --save logo.png
@@ -54,16 +55,19 @@ pub enum Command {
         #[command(subcommand)]
         show: Option<NetworksCommand>,
     },
-    /// Versions, devices and features of this program
+    /// Show version, devices and networks of this program
     #[command(after_help = "Example:
   willmore info --json")]
     Info,
-    /// Check derivatives, symmetry and device on your own input
+    /// Check the computation of a time step on your own input
+    ///
+    /// Taylor tests check the gradient and the Hessian of the energy of a time step. The Hessian must be symmetric. If the program contains another
+    /// CPU backend, it compares the gradient of the device with the gradient of this backend.
     #[command(after_help = "Examples:
   willmore check logo.png
   willmore check builtin:torus --device wgpu")]
     Check(Configured<CheckOptions>),
-    /// Train a network for other ratios than those of the networks that come with the program
+    /// Train a network for a kernel width, an interface width or a time step that no network of the program has
     #[command(after_help = "Example:
   willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25 --save mine.safetensors
   willmore flow logo.png --network mine.safetensors")]
@@ -89,26 +93,34 @@ pub enum RunCommand {
   willmore flow logo.png --frames 1 --save smooth.svg
   willmore flow builtin:cube --tau doubling:1e-6 --steps 10
   willmore flow builtin:ring --tension 4 --steps 12
-Lengths, areas, volumes and times (length^4) are in the units of the mesh, in pixels of the image, or in those of the box.
-The Willmore energy is 1/2 int kappa^2 dA in space, with the sum kappa of the principal curvatures (a sphere has 8 pi, no closed surface less),
-and 1/2 int kappa^2 ds in the plane (a circle of radius R has pi / R).
-Ctrl-C (exit code 130) leaves a run that `willmore resume DIR` continues.")]
+Lengths, areas, volumes and times (length^4) are in the units of the mesh or volume. For an image they are in pixels. \
+For other inputs they are in the units of the box.
+In 3D the Willmore energy is 1/2 int kappa^2 dA, where kappa is the sum of the principal curvatures. A sphere has 8 pi, and no closed surface \
+has less.
+In 2D the Willmore energy is 1/2 int kappa^2 ds, where kappa is the curvature. A circle of radius R has pi / R.
+After Ctrl-C (exit code 130), `willmore resume DIR` continues the run.")]
     Flow(Configured<FlowOptions>),
-    /// Take the noise off a mesh, whose vertices move while all else of the file stays, or make a smooth mesh of a segmentation
+    /// Take the noise off a mesh, or make a smooth mesh of a segmentation
+    ///
+    /// In the file of a mesh, only the positions of the vertices change. With --remesh the result is a new mesh.
     #[command(after_help = "Examples:
   willmore fair scan.stl --save smooth.stl
   willmore fair scan.obj --noise 0.2 --keep box:-5,-5,0,5,5,2
   willmore fair scan.ply --energy-ratio 0.5 --remesh
   willmore fair organs.nii.gz --label all --save organ.stl")]
     Fair(Configured<FairOptions>),
-    /// Fill a region of a shape smoothly; the pixels outside of it and the phase field there stay bit for bit, and a mesh becomes a new one
+    /// Fill a region of a shape smoothly
+    ///
+    /// Outside of the region, the pixels of an image and the values of the phase field do not change at all. If the input is a mesh, the result is a
+    /// new mesh.
     #[command(after_help = "Examples:
   willmore inpaint drawing.png --mask damage.png --steps 40
   willmore inpaint builtin:disc --mask box:0.2,0.2,0.9,0.9 --ansatz empty
   willmore inpaint bunny.ply --mask ball:0.1,0.2,0,0.15
-Regions are in the coordinates of the input: of the mesh or field, in pixels from the lower left corner of an image, of the box about 0.")]
+Regions are in the coordinates of the input. For an image they are in pixels from its lower left corner. \
+For a built-in shape they are in the coordinates of the box, whose centre is 0.")]
     Inpaint(Configured<InpaintOptions>),
-    /// Mean curvature flow, by the network or by finite elements
+    /// Mean curvature flow by a learned network or by finite elements
     #[command(after_help = "Examples:
   willmore mcf logo.png --steps 64
   willmore mcf builtin:torus --method fe-implicit --frames 4")]
@@ -116,9 +128,10 @@ Regions are in the coordinates of the input: of the mesh or field, in pixels fro
     Mcf(Configured<McfOptions>),
 }
 
-const MCF_STEPS: &str = "Stop after this many steps, of (eps/h)^2/4 cells squared each [default: 20, or 100000 with --time]";
+const MCF_STEPS: &str = "Stop after this many steps; the size of a step is eps^2 / 4 for the interface width eps \
+[default: 20, or 100000 with --time]";
 const MCF_TIME: &str =
-    "Stop with the step that reaches this time, a squared length in the units of the input";
+    "Stop with the step that reaches this time, which is in (units of length of the input)^2";
 
 /// Options that can also stand in a file.
 #[derive(Args, Clone, Debug)]
@@ -126,7 +139,7 @@ pub struct Configured<O: Args> {
     #[command(flatten)]
     pub options: O,
 
-    /// Read options from a file, `name = value`; those on the command line win
+    /// Read options from a file with lines `name = value`; options on the command line take precedence
     #[arg(
         long,
         value_name = "FILE.toml",
@@ -143,7 +156,9 @@ pub struct MessageOptions {
     #[arg(long, global = true, help_heading = "Output")]
     pub quiet: bool,
 
-    /// Print the outcome as JSON: one object, with --label all one for each label; the networks as an array
+    /// Print the outcome as JSON
+    ///
+    /// The outcome is one object. With --label all there is one object for each label. The command `networks` prints an array.
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
 }
@@ -153,11 +168,11 @@ pub struct ResumeOptions {
     /// The folder of the run
     pub run: PathBuf,
 
-    /// Go on from the newest undamaged state of a run in which files are damaged or missing
+    /// Continue from the newest undamaged state if files of the run are damaged or missing
     #[arg(long)]
     pub recover: bool,
 
-    /// Go on to so many steps in all, also with a finished run
+    /// Continue until the run has COUNT steps in total, even if it is finished
     #[arg(long, value_name = "COUNT", value_parser = count)]
     pub steps: Option<usize>,
 
@@ -167,7 +182,7 @@ pub struct ResumeOptions {
 
 #[derive(Subcommand, Clone, Debug)]
 pub enum NetworksCommand {
-    /// Everything about one network
+    /// Show everything about one network
     Show {
         /// Name in the list, or a file
         network: String,

@@ -21,6 +21,7 @@ use jobs::settings::COMMAND;
 
 use crate::cli::Cli;
 use crate::error::{Error, Result, one_line, refuse};
+use crate::spelling::spelled;
 
 /// Longest configuration file, in bytes; all options take some thousand.
 const LONGEST: usize = 1 << 16;
@@ -28,9 +29,28 @@ const LONGEST: usize = 1 << 16;
 /// Of other options the last one counts; a second one of these might be meant to add to the first.
 const ALONE: [&str; 3] = ["--keep", "--mask", "--label"];
 
-/// The program's options. Negative numbers are values, to be refused for what they are.
-fn program() -> clap::Command {
-    Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
+/// The program's options, with a help that spells them as they are typed. Negative numbers are values, to be refused for what they are.
+pub fn program() -> clap::Command {
+    Cli::command().mut_subcommands(|command| {
+        let command = command
+            .allow_negative_numbers(true)
+            .mut_args(with_spelled_help);
+        match command.get_after_help().map(ToString::to_string) {
+            Some(text) => command.after_help(spelled(&text)),
+            None => command,
+        }
+    })
+}
+
+/// The help of an argument of the library, which has names of options in backticks.
+fn with_spelled_help(mut argument: clap::Arg) -> clap::Arg {
+    if let Some(text) = argument.get_help().map(ToString::to_string) {
+        argument = argument.help(spelled(&text));
+    }
+    if let Some(text) = argument.get_long_help().map(ToString::to_string) {
+        argument = argument.long_help(spelled(&text));
+    }
+    argument
 }
 
 /// What was typed, together with the configuration file it names.

@@ -40,11 +40,11 @@ pub enum Method {
 #[display(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
 pub enum Formulation {
-    /// Calibrated, with the operator of the accurate recipe in place of the paper's
+    /// Calibrated, with the most accurate network in place of the paper's network
     Accurate,
-    /// Divided by the step's calibration factors; a learned operator with its odd part, which treats both phases alike
+    /// Calibrated; a learned operator `V[u]` is replaced by its odd part `(V[u] - V[-u]) / 2`, which treats both phases alike
     Calibrated,
-    /// As in the paper
+    /// As in the paper, without calibration
     #[default]
     Paper,
 }

@@ -1,4 +1,4 @@
-//! The options of jobs. Programs can read them with clap; what is left open has a default that depends on the input.
+//! The options of jobs. Programs can read them with clap. An option that is not given gets a default, which may depend on the input.
 
 use clap::{Args, ValueEnum};
 use engine::Storage;
@@ -23,15 +23,16 @@ const ADVANCED: &str = "Advanced";
 pub struct InputOptions {
     /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
     ///
-    /// A mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume of voxels (.nii, .nii.gz, .mrc, .map, and .tif
-    /// of several pages), a field (.npy), builtin:NAME with NAME one of disc, ring, cross, rectangle, sphere, cube, torus, coin, figure,
-    /// lever, a region as box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z, or - for standard input
+    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .mrc, .map, or .tif with
+    /// several pages. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring, cross, rectangle, sphere, cube, torus, coin,
+    /// figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is
+    /// standard input.
     pub input: Option<Input>,
 
     /// Cells per unit length of the box [default: depends on the input]
     ///
-    /// Without it a mesh, an image or a volume gets the coarsest of a few grids that holds its thin parts. A field keeps its own grid. Other shapes
-    /// get 128 cells in the plane and 64 in space.
+    /// By default, a mesh, an image or a volume gets the coarsest of a few grids that resolves its thin parts. A field keeps its own grid. Other
+    /// shapes get 128 cells per unit length in 2D and 64 in 3D.
     #[arg(long, value_name = "N", help_heading = GRID)]
     pub cells: Option<usize>,
 
@@ -39,9 +40,10 @@ pub struct InputOptions {
     #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
     pub box_side: Option<f64>,
 
-    /// Longest side of the shape in units of --box-side [default: 0.6 of the box, for `fair` of a mesh 0.8 or 0.9]
+    /// Longest side of the shape in the box, in the same unit as `box_side` [default: 0.6 of the side of the box]
     ///
-    /// The box is scaled to a mesh, an image or a volume. All other lengths are in the units of the input.
+    /// A mesh, an image or a volume is scaled to this size in the box. Other options take lengths in the units of the input, except for `box_side`.
+    /// For `fair` of a mesh, the default is 0.9 of the side of the box if noise is taken off, and 0.8 if not.
     #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
     pub side_length: Option<f64>,
 
@@ -49,25 +51,25 @@ pub struct InputOptions {
     #[arg(long, value_name = "SIDE", value_enum, help_heading = INPUT, hide_short_help = true)]
     pub inside: Option<Inside>,
 
-    /// Value between inside and outside [default: 0.5 for an image]
+    /// Value that separates inside and outside [default: 0.5 for an image]
     ///
     /// For an image it is a grey value or an opacity from 0 to 1. For a volume it is in the units of the volume, and larger values are inside.
     #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
     pub threshold: Option<f64>,
 
-    /// The label of a volume that is inside, or all [default: the larger of two values]
+    /// Label of the voxels that are inside, or all [default: the larger one if there are two]
     ///
-    /// With all, each label but 0 becomes a surface of its own.
+    /// With all, each label except 0 becomes a surface of its own.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
     pub label: Option<Label>,
 
-    /// Repair a mesh that is open, crosses itself or is not oriented alike
+    /// Repair a mesh that is open, crosses itself, or has triangles of inconsistent orientation
     ///
     /// The repair makes a new mesh, and the program reports the changes.
     #[arg(long, help_heading = INPUT, hide_short_help = true)]
     pub repair: bool,
 
-    /// The kind of the values of a field [default: phase-field]
+    /// Kind of the values of a field [default: phase-field]
     #[arg(long, alias = "holds", value_name = "KIND", value_enum, help_heading = INPUT, hide_short_help = true)]
     pub field_kind: Option<FieldKind>,
 }
@@ -76,11 +78,11 @@ pub struct InputOptions {
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Inside {
-    /// Opaque ones, or those unlike the border
+    /// Opaque pixels if some are transparent; else dark ones, or light ones if most of the border is dark
     Auto,
-    /// Dark ones
+    /// Dark pixels
     Dark,
-    /// Light ones
+    /// Light pixels
     Light,
 }
 
@@ -94,17 +96,18 @@ pub enum FieldKind {
     Distance,
 }
 
-/// Which operator, at which scales.
+/// The operator and its scales.
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct OperatorOptions {
-    /// Interface width in cells [default: 2, or that of --network]
+    /// Interface width in cells [default: 2; with `network`, the width that the network was trained for]
     #[arg(long, value_name = "RATIO", help_heading = ADVANCED, hide_short_help = true)]
     pub eps_over_h: Option<f64>,
 
     /// Formulation of a time step
     ///
-    /// accurate: the most accurate network, calibrated. calibrated: the paper's network, calibrated. paper: as in the paper.
+    /// Calibration corrects the error of the network in the energy: it divides the two terms of the energy by one factor each. The paper is that of
+    /// Rumpf, Sassen and Norden-Smoch.
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -116,14 +119,14 @@ pub struct OperatorOptions {
     #[serde(rename = "scheme")]
     pub formulation: Formulation,
 
-    /// Use this network, as `willmore train` makes them
+    /// Use the network in this file, which `willmore train` has made
     #[arg(long, value_name = "FILE", help_heading = ADVANCED, hide_short_help = true)]
     pub network: Option<PathBuf>,
 
     /// Part of the phase field that is stored: dense, bricks or auto [default: auto]
     ///
-    /// dense stores the whole grid, and bricks stores cells near the surface. auto takes bricks where they are less than half of the grid. Mean
-    /// curvature flow, finite elements and the paper's networks always take the whole grid.
+    /// dense stores the whole grid. bricks stores only blocks of cells near the surface. auto stores bricks if they are less than half of the grid,
+    /// else the whole grid. Mean curvature flow, finite elements and the paper's networks always store the whole grid.
     #[arg(
         long,
         value_name = "PART",
@@ -146,10 +149,10 @@ impl Default for OperatorOptions {
     }
 }
 
-/// What is there stays, unless this is given.
+/// Whether files and runs are overwritten.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ForceOption {
-    /// Write over what is there: a file, or the run in a folder
+    /// Overwrite an existing file, or the run in an existing folder
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     pub force: bool,
 }
@@ -161,7 +164,7 @@ pub struct CommonOptions {
     #[arg(long, value_name = "NAME", help_heading = RUN, hide_short_help = true)]
     pub device: Option<String>,
 
-    /// Seed of the random numbers of check and train; flows have none
+    /// Seed of the random numbers of `check` and `train`; flows use none
     #[arg(long, default_value_t = 1, help_heading = RUN, hide_short_help = true)]
     pub seed: u64,
 }
@@ -179,15 +182,15 @@ impl Default for CommonOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// Stop after this many steps [default: 20, or 1000 where something else ends the run]
+    /// Stop after this many steps [default: 20, or 1000 if something else ends the run]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
     pub steps: Option<usize>,
 
-    /// Stop at this time, a length to the fourth power in the units of the input
+    /// Stop at this time, which is in (units of length of the input)^4
     #[arg(long, value_name = "T", value_parser = positive, help_heading = FLOW)]
     pub time: Option<f64>,
 
-    /// Keep a picture, the field and the shape every so many steps, and an animation
+    /// Keep a picture, the field and the shape after every EVERY steps, and make an animation of the pictures
     #[arg(long, value_name = "EVERY", value_parser = count, help_heading = OUTPUT)]
     pub frames: Option<usize>,
 
@@ -204,26 +207,27 @@ pub struct RunOptions {
 
     /// Axis that points up in pictures, on the page and in written meshes: x, y or z [default: depends on the input]
     ///
-    /// Without it the axis is the one that the mesh names, or else y for .obj and builtin:figure, and z for all others.
+    /// By default it is the axis that a comment in the mesh names. Without such a comment it is y for .obj and builtin:figure, and z for all other
+    /// inputs.
     #[arg(long, value_name = "AXIS", help_heading = OUTPUT, hide_short_help = true)]
     pub up: Option<UpAxis>,
 
-    /// Leave out index.html, the page of the run for a browser
+    /// Do not write index.html, the page of the run for the browser
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     pub no_page: bool,
 
-    /// Folder of the run [default: runs/NAME-COMMAND, with a number if that is there]
+    /// Folder of the run [default: runs/NAME-COMMAND; a number is added if this folder exists]
     #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
     #[serde(skip)]
     pub output: Option<PathBuf>,
 
     /// Write the result to this file too
     ///
-    /// In space it is a mesh (.ply, .obj, .stl), in the plane a picture (.png, .svg). - is standard output.
+    /// In 3D the result is a mesh (.ply, .obj, .stl), in 2D a picture (.png, .svg). The name - means standard output.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub save: Option<PathBuf>,
 
-    /// Whether files and runs are written over.
+    /// Whether files and runs are overwritten.
     #[command(flatten)]
     #[serde(skip)]
     pub force: ForceOption,
@@ -249,72 +253,79 @@ impl Default for RunOptions {
 #[derive(Args, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "kebab-case")]
 pub struct WillmoreOptions {
-    /// Rule for the time steps, in lengths of the input to the fourth power [default: controlled]
+    /// Rule for the time steps [default: depends on the command]
     ///
-    /// controlled: steps of second order, whose errors control their sizes. auto, auto:FIRST: steps that follow the energy. VALUE: equal steps.
-    /// doubling:FIRST: each step is twice the one before. graded:FIRST,PART: each step is a part of the time that is reached.
-    /// growing:VALUE,COUNT: steps double after COUNT of them. ramp:VALUE,HALVINGS: steps grow to VALUE from VALUE halved so often. `inpaint`
-    /// takes a ramp unless this is given. `fair` takes graded steps, and controlled ones if only --steps or --time ends it.
+    /// VALUE and FIRST are in (units of length of the input)^4. controlled: steps of second order, whose estimated errors control their sizes. VALUE:
+    /// equal steps. doubling:FIRST: each step is twice the one before. graded:FIRST,PART: each step is PART times the time since the start, and at
+    /// least FIRST. growing:VALUE,COUNT: COUNT steps of size VALUE, then each step is twice the one before. ramp:VALUE,HALVINGS: two steps of size
+    /// VALUE / 2^HALVINGS, then steps double until they have the size VALUE. auto or auto:FIRST: a step that lowers the energy by little is followed
+    /// by one twice as long, and a step that lowers it by much is followed by one half as long.
+    ///
+    /// The default of `flow` is controlled, and that of `inpaint` is a ramp. The default of `fair` is graded steps, or controlled ones if only
+    /// `steps` or `time` ends the run.
     #[arg(long, value_name = "TAU", help_heading = FLOW, hide_short_help = true)]
     pub tau: Option<StepRule>,
 
     /// Tolerated error of controlled time steps, a LENGTH or PERCENT [default: 1.5%]
     ///
-    /// A length, in the units of the input, is for the whole run. A percentage is for each step: a part of the way of the surface in the step.
+    /// A length is in the units of the input, and limits the error of the whole run. A percentage limits the error of each step, relative to the
+    /// distance that the surface moves in this step.
     #[arg(long, value_name = "LENGTH", value_parser = Amount::tolerance, allow_hyphen_values = true, help_heading = FLOW, hide_short_help = true)]
     pub tolerance: Option<Amount>,
 
-    /// Hold the volume in space: keep, a VALUE, or PERCENT, as 90% [default: keep for `fair` of a segmentation]
+    /// In 3D, hold or change the volume: keep, a VALUE, or PERCENT such as 90% [default: keep for `fair` of a segmentation]
     ///
-    /// A value is in the units of the input. A percentage is of the volume at the beginning. For a segmentation that is the volume of its voxels
-    /// without specks.
+    /// A value is in the units of the input. A percentage is relative to the volume at the beginning. For a segmentation, this is the volume of its
+    /// voxels without specks.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub volume: Option<SizeTarget>,
 
-    /// Hold the length of a curve in the plane: keep, a VALUE, or PERCENT, as 105%
+    /// In 2D, hold or change the length of the curve: keep, a VALUE, or PERCENT such as 105%
     ///
-    /// `flow` first makes edges round that are sharper than the interface. The length comes back over the ramp.
+    /// `flow` first rounds edges whose radius is smaller than the interface is wide. This changes the length. Then the length goes to its target in
+    /// `ramp` steps.
     #[arg(long, value_name = "TARGET", help_heading = SIZES, hide_short_help = true)]
     pub length: Option<SizeTarget>,
 
-    /// Hold the area, in space of the surface, in the plane of the inside: keep, a VALUE, or PERCENT, as 105%
+    /// Hold or change the area of the surface (3D) or of the inside (2D): keep, a VALUE, or PERCENT such as 105%
     ///
-    /// In space `flow` first makes edges round that are sharper than the interface. The area comes back over the ramp.
+    /// In 3D, `flow` first rounds edges whose radius is smaller than the interface is wide. This changes the area. Then the area goes to its target
+    /// in `ramp` steps.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub area: Option<SizeTarget>,
 
-    /// Keep the area of the surface, and drive the volume to this reduced volume, above 0 and below 1
+    /// Keep the area of the surface, and change the volume until the reduced volume is PART, between 0 and 1
     ///
-    /// The reduced volume is 6 sqrt(pi) V / A^(3/2) for a volume V and an area A. A ball has 1, a red blood cell 0.64. In the plane the length L
-    /// stays, and the area A goes to this value of 4 pi A / L^2.
+    /// The reduced volume is 6 sqrt(pi) V / A^(3/2) for a volume V and an area A. It is 1 for a ball and 0.64 for a red blood cell. In 2D the length
+    /// L stays constant, and the area A changes until 4 pi A / L^2 is PART.
     #[arg(long, value_name = "PART", conflicts_with_all = ["volume", "area", "length"], help_heading = SIZES, hide_short_help = true)]
     pub reduced_volume: Option<f64>,
 
-    /// Steps over which sizes go to their targets [default: 20]
+    /// Number of steps in which sizes go to their targets [default: 20]
     #[arg(long, value_name = "STEPS", help_heading = SIZES, hide_short_help = true)]
     pub ramp: Option<usize>,
 
-    /// Spontaneous curvature c0, one over a length [default: 0]
+    /// Spontaneous curvature c0, in 1 / length [default: 0]
     ///
-    /// The energy is 1/2 int (kappa - c0)^2 dA with the sum kappa of the principal curvatures, which is positive for a ball.
+    /// The energy is 1/2 int (kappa - c0)^2 dA. kappa is the sum of the principal curvatures, which is positive for a ball.
     #[arg(long, value_name = "C0", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub spontaneous_curvature: Option<f64>,
 
-    /// Surface tension, one over a length squared [default: 0]
+    /// Surface tension, in 1 / length^2 [default: 0]
     ///
-    /// It adds this times the area of the surface to the energy, in the plane this times the length of the curve.
+    /// SIGMA times the area of the surface is added to the energy. In 2D, SIGMA times the length of the curve is added.
     #[arg(long, value_name = "SIGMA", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub tension: Option<f64>,
 
-    /// Pressure, one over a length cubed [default: 0]
+    /// Pressure, in 1 / length^3 [default: 0]
     ///
-    /// It adds this times the volume to the energy, in the plane this times the area of the inside.
+    /// P times the volume is added to the energy. In 2D, P times the area of the inside is added.
     #[arg(long, value_name = "P", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub pressure: Option<f64>,
 
-    /// Stop when the Willmore energy is no more than this
+    /// Stop when the Willmore energy is no more than W
     ///
-    /// A sphere has 8 pi = 25.13, a circle of radius R has pi / R.
+    /// The energy of a sphere is 8 pi = 25.13. The energy of a circle of radius R is pi / R.
     #[arg(long, value_name = "W", value_parser = positive, help_heading = FLOW, hide_short_help = true)]
     pub energy: Option<f64>,
 }
@@ -348,7 +359,7 @@ pub struct FlowOptions {
 #[derive(Args, Serialize, Clone, Debug, Default)]
 #[serde(rename_all = "kebab-case")]
 pub struct FairOptions {
-    /// The flow.
+    /// The options of the flow.
     #[command(flatten)]
     #[serde(flatten)]
     pub willmore: WillmoreOptions,
@@ -371,27 +382,29 @@ pub struct FairOptions {
 
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
-    /// It is measured along the normals. It is estimated unless --time, --energy, --energy-ratio or --steps says when to stop. A segmentation has no such
-    /// noise: it flows for the time (1.6 voxels)^4, or until its surface has moved by 0.35 of a voxel.
+    /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. A
+    /// segmentation has no such noise. Unless one of these options says when to stop, it flows for the time (1.6 voxels)^4, or until its surface has
+    /// moved by 0.35 of a voxel.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
 
-    /// Stop as soon as the Willmore energy is no more than this part of the energy at the beginning
+    /// Stop as soon as the Willmore energy is no more than PART of the energy at the beginning
     ///
-    /// The volume changes, unless --volume keep holds it.
+    /// The volume changes, unless `volume` keep holds it.
     #[arg(long, value_name = "PART", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub energy_ratio: Option<f64>,
 
-    /// Region of the mesh that stays where it is: a box, a ball, a closed mesh, or a colour
+    /// Part of the mesh that does not move: a box, a ball, the inside of a closed mesh, or a colour
     ///
-    /// Regions are box:x0,y0,z0,x1,y1,z1, ball:x,y,z,r, or the inside of a closed mesh in a file (.obj, .stl, .ply), in the coordinates of the
-    /// input. colour:ff0000 names the vertices of a colour.
+    /// A box is box:x0,y0,z0,x1,y1,z1, and a ball is ball:x,y,z,r. A closed mesh is a file (.obj, .stl, .ply). All three are in the coordinates of
+    /// the input. colour:ff0000 means the vertices of this colour.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = FLOW)]
     pub keep: Option<String>,
 
-    /// Write a new mesh in place of the input with its vertices moved
+    /// Write a new mesh; otherwise the result is the mesh of the input with moved vertices
     ///
-    /// The new mesh is the zero level set on the grid. With --repair the input need not be closed. A segmentation always gives a new mesh.
+    /// The new mesh is the zero level set of the phase field on the grid. With `repair`, the input need not be closed. A segmentation always gives a
+    /// new mesh.
     #[arg(long, help_heading = OUTPUT)]
     pub remesh: bool,
 
@@ -407,7 +420,7 @@ pub struct FairOptions {
 /// Options of inpainting.
 #[derive(Args, Serialize, Clone, Debug, Default)]
 pub struct InpaintOptions {
-    /// The flow.
+    /// The options of the flow.
     #[command(flatten)]
     #[serde(flatten)]
     pub willmore: WillmoreOptions,
@@ -428,14 +441,15 @@ pub struct InpaintOptions {
     #[serde(flatten)]
     pub common: CommonOptions,
 
-    /// The region that is filled: an image, box:x0,y0,x1,y1, or ball:x,y,r, in 3D with z
+    /// Region to fill: an image, box:x0,y0,x1,y1 or ball:x,y,r, in 3D box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r
     ///
-    /// An image has the size of the input; for an input that is no image it is a square, which fills the box. Its opaque pixels are the region if some
-    /// pixels are transparent. Otherwise the dark pixels are the region, or the light ones if most of the border is dark.
+    /// If input and mask are images, they have the same width and height. If only the mask is an image, it is a square that covers the whole box. The
+    /// region consists of the opaque pixels if some pixels are transparent. Otherwise it consists of the dark pixels, or of the light ones if most of
+    /// the border is dark.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = INPUT)]
     pub mask: Option<String>,
 
-    /// Shape in the region at the beginning: keep, empty, full, or box:... or ball:...
+    /// Shape in the region at the beginning: keep, empty, full, box:... or ball:...
     #[arg(long, value_name = "SHAPE", default_value = "keep", help_heading = FLOW)]
     pub ansatz: Ansatz,
 }
@@ -443,7 +457,7 @@ pub struct InpaintOptions {
 /// Options of mean curvature flow.
 #[derive(Args, Serialize, Clone, Debug)]
 pub struct McfOptions {
-    /// The step of mean curvature flow
+    /// Method for the steps of mean curvature flow
     #[arg(long, value_name = "NAME", value_enum, default_value = "network", help_heading = FLOW)]
     pub method: Method,
 
@@ -486,17 +500,17 @@ pub struct SampleOptions {
 
     /// The file to write
     ///
-    /// A picture (.png, of a plane shape .svg), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz).
+    /// It is a picture (.png, or .svg for a shape in 2D), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz).
     #[arg(long, value_name = "FILE")]
     pub save: PathBuf,
 
-    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D with z
+    /// Cut this region out: box:x0,y0,x1,y1 or ball:x,y,r, in 3D box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r
     ///
-    /// It may be given several times.
+    /// The option may be given several times.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub without: Vec<Region>,
 
-    /// Move the vertices of a mesh along their normals by random lengths of up to this
+    /// Move the vertices of a mesh along their normals by random lengths, at most LENGTH
     #[arg(long, value_name = "LENGTH", default_value_t = 0.0)]
     pub noise: f64,
 
@@ -504,17 +518,21 @@ pub struct SampleOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Write the zero level set on the grid, also where a mesh would be converted as it is
+    /// Write the zero level set on the grid, also if the input is a mesh
+    ///
+    /// By default, the file is the mesh of the input with its vertices and triangles. `without`, `cells`, `box_side` and `side_length` also make a
+    /// new mesh.
     #[arg(long)]
     pub resample: bool,
 
     /// Axis that points up in the picture or the mesh: x, y or z [default: depends on the input]
     ///
-    /// Without it the axis is the one that the input names, or else y for .obj and builtin:figure, and z for all others.
+    /// By default it is the axis that a comment in the mesh names. Without such a comment it is y for .obj and builtin:figure, and z for all other
+    /// inputs.
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
 
-    /// Whether files are written over.
+    /// Whether files are overwritten.
     #[command(flatten)]
     pub force: ForceOption,
 }
@@ -536,11 +554,11 @@ pub struct CheckOptions {
 /// Options of training a network.
 #[derive(Args, Clone, Debug, Default)]
 pub struct TrainOptions {
-    /// Dimension of space, 2 or 3; required, like --width, --eps-over-h and --save
+    /// Dimension of space, 2 or 3; required, like `width`, `eps_over_h` and `save`
     #[arg(long, value_name = "D")]
     pub dimension: Option<usize>,
 
-    /// Width of the kernel in cells, odd
+    /// Width of the kernel in cells, an odd number
     #[arg(long, value_name = "CELLS")]
     pub width: Option<usize>,
 
@@ -548,7 +566,7 @@ pub struct TrainOptions {
     #[arg(long, value_name = "RATIO")]
     pub eps_over_h: Option<f64>,
 
-    /// Time step of the mean curvature flow in cells squared [default: (eps/h)^2/4, what the other commands need]
+    /// Time step of mean curvature flow in cells squared [default: `eps_over_h`^2 / 4, as the other commands need it]
     #[arg(long, value_name = "RATIO")]
     pub step_over_h2: Option<f64>,
 
@@ -556,7 +574,7 @@ pub struct TrainOptions {
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
 
-    /// A network of seconds, for trying out the command
+    /// Train for a few seconds only, to try the command; the network is not accurate
     #[arg(long)]
     pub quick: bool,
 
@@ -570,7 +588,7 @@ pub struct TrainOptions {
 }
 
 impl InputOptions {
-    /// Of this input, with all that is left to it.
+    /// The options of this input, all others with their defaults.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
             input: Some(input.into()),
@@ -580,7 +598,7 @@ impl InputOptions {
 }
 
 impl FlowOptions {
-    /// Of this input, with the defaults of the program.
+    /// The options for this input, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
             input: InputOptions::of(input),
@@ -590,7 +608,7 @@ impl FlowOptions {
 }
 
 impl FairOptions {
-    /// Of this mesh or segmentation, with the defaults of the program.
+    /// The options for this mesh or segmentation, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
             input: InputOptions::of(input),
@@ -600,7 +618,7 @@ impl FairOptions {
 }
 
 impl InpaintOptions {
-    /// Of this input and the region in it that is filled, with the defaults of the program.
+    /// The options for this input and the region to fill, with the defaults of the program.
     pub fn of(input: impl Into<Input>, mask: impl Into<String>) -> Self {
         Self {
             input: InputOptions::of(input),
@@ -611,7 +629,7 @@ impl InpaintOptions {
 }
 
 impl McfOptions {
-    /// Of this input, by the network, with the defaults of the program.
+    /// The options for this input and the method of the network, with the defaults of the program.
     pub fn of(input: impl Into<Input>) -> Self {
         Self {
             input: InputOptions::of(input),
@@ -621,7 +639,7 @@ impl McfOptions {
 }
 
 impl SampleOptions {
-    /// Of this input, to this file, as it is.
+    /// The options that write this input to this file unchanged.
     pub fn of(input: impl Into<Input>, save: impl Into<PathBuf>) -> Self {
         Self {
             input: InputOptions::of(input),

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 use model::{Network, Shipped};
 
 use operators::{ComputeDevice, DeviceKind};
 use serde_json::{Value, json};
 
-use crate::cli::{Cli, NetworksCommand};
+use crate::cli::NetworksCommand;
+use crate::config::program;
 use crate::console::Console;
 use crate::error::{Result, refuse};
 
@@ -87,14 +87,14 @@ fn stem(name: &str) -> String {
 
 pub fn completions(shell: Shell, console: &Console) -> Result<()> {
     let mut text = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "willmore", &mut text);
+    clap_complete::generate(shell, &mut program(), "willmore", &mut text);
     console.write(&text)
 }
 
 /// Prints the manual page: that of the program, then those of its commands.
 pub fn man(console: &Console) -> Result<()> {
     let mut text = Vec::new();
-    let mut command = Cli::command();
+    let mut command = program();
     command.build();
     let pages = std::iter::once(&command).chain(command.get_subcommands());
     for page in pages {
