@@ -31,10 +31,10 @@
 //! `[profile.dev.package."*"]` in its `Cargo.toml`. It does not inherit the profile of this workspace. Without optimization each step takes many
 //! times as long.
 //!
-//! A [`Case`] is everything that a result depends on: initial phase field, region, held perimeter and volume, operator, scales, time steps,
-//! stop rules, measures. Only a [`Run`] computes a case, step by step ([`Run::step`]) or to its end ([`Run::advance`]). The solver knows
-//! nothing of files, progress or shapes. [Observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk. One
-//! checkpoint holds the phase fields and all records. A run that is resumed from it ends with the same bytes.
+//! A [`Case`] is everything that a result depends on: initial phase field, region, held perimeter and volume, operator, scales, time steps, stop
+//! rules, measures. Only a [`Run`] computes a case, step by step ([`Run::step`]) or to its end ([`Run::advance`]). The solver knows nothing of
+//! files, progress or shapes. [Observers](Observer) are called after each accepted step. A [`Store`] keeps a run on disk. One checkpoint holds
+//! the phase fields and all records. A run that is resumed from it gives the same results, byte for byte, as a run without interruption.
 //!
 //! [`Run::step`] makes one step in three parts. A [`Controller`] gives the size. A [`Scheme`](solver::Scheme) makes a candidate. The controller
 //! accepts the candidate, or asks for another one. Your own terms, schemes, controllers and stop rules go into [`Own`], an operator into

@@ -35,7 +35,7 @@
 //! Conjugate gradients solve the linear systems. Their preconditioner is the exact inverse in the pure phases, by Fourier transforms. With
 //! the width $`\varepsilon`$ of the interface, the size $`\tilde\tau`$ of the step and $`s = \tilde\tau / \varepsilon^2`$, the spectrum of the
 //! preconditioned matrix lies between $`(1 - \frac{9}{8} s) / (1 + \frac{9}{4} s)`$ and 1, independent of the grid. [`LinearSolver::Direct`] is a
-//! sparse Cholesky factorization. It stands for the direct solver (PARDISO) of the paper's comparison.
+//! sparse Cholesky factorization. It takes the place of PARDISO, the direct solver in the comparisons of Rumpf, Sassen and Norden-Smoch (2026).
 //!
 //! # Derivatives
 //!

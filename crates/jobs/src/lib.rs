@@ -17,12 +17,13 @@
 //! # }
 //! ```
 //!
-//! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a
-//! run in a folder, with pictures and a page, and [`resume`] continues it. [`open`] is the way from an input to a phase field on a good grid.
-//! [`check`] checks derivatives there, and [`train`] makes networks for other ratios.
+//! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a run
+//! in a folder, with pictures and a page, and [`resume`] continues it. [`open`] turns an input into a phase field on a suitable grid.
+//! [`check`] tests derivatives on an input, and [`train`] trains networks for other ratios.
 //!
-//! Nothing is printed. A [`Watcher`] hears [warnings](Warning) and [notes](Note) as values with their numbers, follows the progress, and can interrupt.
-//! Messages name options in backticks, as `cells`: a program can show them as it spells them.
+//! Nothing is printed. A job tells a [`Watcher`] its [warnings](Warning), its [notes](Note) and its progress. Warnings and notes are typed
+//! values that contain the numbers. The watcher can also interrupt the job. Messages write the names of options in backticks, such as `cells`. A
+//! program can replace such a name by its own spelling, such as `--cells`.
 
 mod case;
 mod check;

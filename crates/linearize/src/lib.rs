@@ -56,10 +56,10 @@
 //!   Hessian-vector product. [`Graph::trace`] records any function, and `apply` is its
 //!   Jacobian-vector product.
 //! - Gradients are Burn's: derivatives by each element, without the weight of an inner product.
-//! - Precision follows the variables. Say `(&device, DType::F64)` when you create tensors outside.
-//!   Otherwise Burn casts to the device's default type. Inside a traced function,
-//!   [`Inputs::device`] has the right default. But methods named after `f32`, like `from_floats`,
-//!   round to single precision first.
+//! - Precision follows the variables. When you create a tensor outside of the traced function, pass
+//!   `(&device, DType::F64)` for its device. Otherwise Burn casts to the device's default type. Inside
+//!   the traced function, [`Inputs::device`] has the right default. But methods named after `f32`,
+//!   like `from_floats`, round to single precision first.
 //! - The traced function sees no values. Control flow that depends on values is not recorded:
 //!   use masks. Piecewise functions have the derivative of the piece that a value is on.
 //! - Burn's `detach` changes the gradient that Burn computes. The linearization then differentiates
@@ -70,10 +70,10 @@
 //!
 //! [`Graph::linearize`] shares common subexpressions, removes products with ones and sums with zeros,
 //! and keeps a constant as one number instead of a grid of equal numbers. As long as operations are
-//! elementwise, a tangent stays a sum of *coefficient times tangent*. So pointwise second derivatives
-//! merge into one coefficient, which is computed once per point. [`Program::statistics`] counts the
-//! remaining operations. If asked to, [`Graph::linearize`] runs the products in another precision than
-//! values and gradients.
+//! elementwise, the tangent of a value is kept as a sum of products, each of a coefficient and the
+//! tangent of an earlier value. So pointwise second derivatives merge into one coefficient, which is
+//! computed once per point. [`Program::statistics`] counts the remaining operations. If asked to,
+//! [`Graph::linearize`] runs the products in another precision than values and gradients.
 //!
 //! The program knows the last use of every value, so backends compute in place. Between
 //! [`at`](Linearization::at) and [`apply`](Linearization::apply) it keeps only the values that the

@@ -7,8 +7,9 @@
 //! w[u] = \frac{\varepsilon}{2 c \tilde\tau^2} \int |v[u] - u|^2
 //! ```
 //!
-//! with the size $`\tilde\tau`$ of the step, the width $`\varepsilon`$ of the interface, and a factor $`c`$, which is 1 for an exact step.
-//! [`calibration`] explains this factor. For a step that gives $`v[u]`$ alone, [`measured`] computes it, and the inverse in the pure phases.
+//! with the size $`\tilde\tau`$ of the step, the width $`\varepsilon`$ of the interface, and a factor $`c`$ near 1. (It is 1 for an exact step
+//! with a symmetric derivative.) [`calibration`] explains this factor. A step may implement nothing but $`v[u]`$. Then [`measured`] computes
+//! $`c`$, and the inverse of the Hessian in the pure phases for the preconditioner of the solver.
 
 pub mod calibration;
 mod error;

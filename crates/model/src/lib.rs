@@ -34,9 +34,9 @@
 //!
 //! # Training
 //!
-//! [`training::adam`] is the paper's method. [`training::levenberg_marquardt`] minimizes the paper's loss
-//! to its floor in about half a minute. The smallest spheres dominate this loss, so losses for different radii cannot be compared.
-//! [`Quality`] measures the loss on two fixed sets of radii. For Willmore flow a small loss is not enough: see [`mean_curvature::calibration`].
+//! [`training::adam`] is the method of Rumpf, Sassen and Norden-Smoch. [`training::levenberg_marquardt`] minimizes their loss to its floor in
+//! about half a minute. The smallest spheres dominate this loss, so losses for different radii cannot be compared. [`Quality`] measures the loss
+//! on two fixed sets of radii. For Willmore flow a small loss is not enough: see [`mean_curvature::calibration`].
 //!
 //! Errors of the device and of the crates below pass through unchanged.
 

@@ -21,7 +21,7 @@
 //! |---|---|---|
 //! | [`circular_convolution`] | `y_a = sum_b K_b x_{a+b}` | by `x`: the same operation with `adjoint` flipped; by `K`: `c_b = sum_a g_a x_{a+b}` for the gradient `g` of the output |
 //! | [`brick_convolution`] | `y_a = sum t_b .. t_c x_{a+(b,..,c)}` on active bricks (`geometry::Bricks`) | the same operation with `adjoint` flipped |
-//! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` there, along one axis `e` | its transpose |
+//! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` on active bricks, along one axis `e` | its transpose |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | the same operation with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
 //! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`], [`update_on_host`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y`, work on the host | none (iterative solvers) |

@@ -40,8 +40,8 @@
 //!   keyboard, and every picture has a text for readers who cannot see it.
 //! - Pictures have a white background, also on a dark page: figures are drawn for paper.
 //! - The same input gives the same bytes.
-//! - A page opened as `page.html#check` starts everything on it, and lists failures in the attribute
-//!   `data-check` of its root. `scripts/check_pages` reads this attribute.
+//! - A page that is opened as `page.html#check` starts its viewers, and checks its pictures and links. It lists
+//!   failures in the attribute `data-check` of its root element. `scripts/check_pages` reads this attribute.
 //! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]

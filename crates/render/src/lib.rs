@@ -42,7 +42,7 @@
 //! - The solid is where `u > 0` inside the box of the grid. Points beyond the box are outside of the solid. Pictures are not periodic.
 //! - The triangles of [`surfaces::isosurface`] are drawn with interpolated normals, and sorted by depth
 //!   for several samples of every pixel.
-//! - Ambient occlusion and shadows are computed at the vertices, for fixed directions of light.
+//! - Ambient occlusion and shadows are computed at the vertices, for as many directions of light as the [`Quality`] says.
 //! - Lights are fixed to the camera, so that every view is lit alike.
 //! - Light is computed and blended linearly. Given colours and returned pixels are sRGB.
 //! - The same input gives the same bytes, for any number of threads.

@@ -1,5 +1,5 @@
 //! Directories for long computations. A computation that was stopped in any way goes on from its last
-//! commit, and ends with the same bytes as without the stop.
+//! commit. Its files are the same, byte for byte, as without the stop.
 //!
 //! ```
 //! use runs::{CheckpointState, Error, RunDirectory};
@@ -45,15 +45,16 @@
 //!
 //! # What is promised
 //!
-//! - A checkpoint is the commit. Other files are written and flushed before it. So it describes a whole
-//!   state of the run, whenever the process dies. Files that it does not list were written after it. A
-//!   resumed run writes them again.
-//! - Let a run be a function of its [`CheckpointState`]. Then every file that is written once ends with the same bytes, however often the run
-//!   was stopped. At the end only the last checkpoint stays.
+//! - A checkpoint is the commit. All files that it lists are written and flushed before the checkpoint itself. So the last checkpoint describes
+//!   a whole state of the run, whenever the process dies. If the last checkpoint does not list a file, this file was written later. A resumed
+//!   run writes it again.
+//! - Let a run be a function of its [`CheckpointState`]. Then every file that is written once has the same bytes at the end of the run, however
+//!   often the run was stopped. At the end only the last checkpoint stays.
 //! - If a bit has flipped in a file that is written once, opening the run finds it, and the error names the file.
 //!   [`RunDirectory::recover`] goes on from the newest intact commit.
-//! - A reader does not use a number from a file before it has checked the file's length against it. For a checkpoint with large arrays,
-//!   readers take memory of up to four times its length. For its notes (small maps) they take at most 320 times the length of the notes.
+//! - A file may contain a number that says how much data follows. A reader uses such a number only after it has checked that the file is long
+//!   enough. For a checkpoint with large arrays, readers take memory of up to four times its length. For the other data of a checkpoint, its
+//!   [notes](CheckpointState::notes), they take at most 320 times the length of the notes.
 //! - A failed write (full disk, read-only folder) leaves the last commit in place.
 //!
 //! Functions that read or write files can fail with [`Error::Io`]. Functions name other errors in their documentation.

@@ -16,7 +16,7 @@
 //!     let labels = (0..size.iter().product()).map(label).collect();
 //!     let volume = Volume::of_labels(size, [0.0; 3], sides, labels)?;
 //!
-//!     // To a file and back, and its surface, with the volume of the voxels.
+//!     // Write the volume to a file, read it again, and make a surface that encloses the volume of the voxels of label 3.
 //! #   let folder = tempfile::tempdir().expect("a folder for temporary files");
 //! #   let path = folder.path().join("ball.nii.gz");
 //!     write(&path, &volume)?;

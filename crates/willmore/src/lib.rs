@@ -23,15 +23,17 @@
 //! # }
 //! ```
 //!
-//! [`Willmore`] has defaults for most flows: the inner step of mean curvature flow is the learned operator of the accurate recipe, calibrated.
-//! If the bricks near the surface are less than half of the grid, only they are stored. Time steps are of second order, and as long as their
-//! errors allow. The methods of [`Willmore`] change these defaults.
+//! [`Willmore`] has defaults for most flows. Each time step measures curvature by a short step of mean curvature flow, the inner step. By
+//! default this is a learned operator with a network of the accurate recipe, the most accurate one, and it is calibrated: two factors correct
+//! its error (`docs/calibration.md`). The grid is divided into blocks, the bricks. If the bricks near the surface are less than half of the
+//! grid, only they are stored. Time steps are of second order, and their estimated errors limit their sizes. The methods of [`Willmore`] change
+//! these defaults.
 //!
 //! # Meshes, segmentations, drawings
 //!
-//! The jobs of the program `willmore` are functions: [`fair`](jobs::fair), [`flow`](jobs::flow), [`inpaint`](jobs::inpaint),
-//! [`surfaces_of_labels`](jobs::surfaces_of_labels), [`sample`](jobs::sample), and [`run_in_folder`](jobs::run_in_folder) for runs that are kept. They choose the
-//! grid, and tell what it holds and loses.
+//! The commands of the program `willmore` are functions: [`fair`](jobs::fair), [`flow`](jobs::flow), [`inpaint`](jobs::inpaint),
+//! [`surfaces_of_labels`](jobs::surfaces_of_labels), [`sample`](jobs::sample), and [`run_in_folder`](jobs::run_in_folder) for runs that are
+//! kept. They choose the grid, and report which parts of the shape it does not resolve.
 //!
 //! ```no_run
 //! use willmore::prelude::*;
@@ -56,9 +58,9 @@
 //! | a measure | [`Measure`](engine::Measure) | `examples/own_measure.rs` |
 //! | a shape | [`SignedDistance`](geometry::SignedDistance) | `examples/own_shape.rs` |
 //!
-//! Each part is one file that imports the [`prelude`] and Burn. `docs/extending.md` explains them. A flow with such parts has all features of the
-//! loop: regions, held perimeter and volume, control of the steps, stop rules, measures, and checkpoints. A run that is resumed from a checkpoint
-//! ends with the same bytes.
+//! Each part is one file that imports the [`prelude`] and the tensor library Burn. `docs/extending.md` explains the parts. Flows with such parts
+//! have the same features as all other flows: regions, held perimeter and volume, control of the steps, stop rules, measures, and checkpoints. A
+//! run that is resumed from a checkpoint gives the same results, byte for byte, as a run without interruption.
 //!
 //! # The crates
 //!
