@@ -58,4 +58,18 @@ mod tests {
             assert_eq!(spelled(unchanged), unchanged);
         }
     }
+
+    #[test]
+    fn the_help_has_options_as_they_are_typed() {
+        let program = crate::config::program();
+        let all = program
+            .get_subcommands()
+            .flat_map(clap::Command::get_arguments);
+        let texts = all.flat_map(|argument| [argument.get_help(), argument.get_long_help()]);
+        let texts: Vec<String> = texts.flatten().map(ToString::to_string).collect();
+        assert!(texts.iter().any(|text| text.contains("unit as --box-side")));
+        for text in texts {
+            assert_eq!(spelled(&text), text);
+        }
+    }
 }
