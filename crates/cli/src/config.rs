@@ -20,7 +20,7 @@ use toml::{Table, Value};
 use jobs::settings::COMMAND;
 
 use crate::cli::Cli;
-use crate::error::{Error, Result, one_line, refuse};
+use crate::error::{Error, Result, refuse};
 use crate::spelling::spelled;
 
 /// Longest configuration file, in bytes; all options take some thousand.
@@ -114,7 +114,7 @@ fn with_table(arguments: &[OsString], command: &str, table: &Table, path: &Path)
     let parsed = program()
         .try_get_matches_from(all)
         .and_then(|matches| Cli::from_arg_matches(&matches));
-    parsed.map_err(|error| bad(path, one_line(&error)))
+    parsed.map_err(|error| bad(path, jobs::one_line(&error)))
 }
 
 fn bad(path: &Path, message: impl AsRef<str>) -> Error {

@@ -43,7 +43,7 @@ impl From<clap::Error> for Error {
             Kind::DisplayHelpOnMissingArgumentOrSubcommand | Kind::MissingSubcommand => {
                 Self::options("there is no command; see willmore --help")
             }
-            _ => Self::options(format!("{}; see --help", one_line(&error))),
+            _ => Self::options(format!("{}; see --help", jobs::one_line(&error))),
         }
     }
 }
@@ -52,19 +52,4 @@ impl Error {
     pub(crate) fn options(message: impl Into<String>) -> Self {
         Self::Options(message.into())
     }
-}
-
-/// What clap says, on one line.
-pub fn one_line(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let paragraphs = text.split("\n\n").filter(|p| {
-        !(p.starts_with("Usage") || p.starts_with("For more information") || p.trim().is_empty())
-    });
-    let words: Vec<&str> = paragraphs.flat_map(str::split_whitespace).collect();
-    let line = words.join(" ");
-    let line = line.strip_prefix("error: ").unwrap_or(&line);
-    line.replace(
-        "invalid digit found in string",
-        "it must be a whole number, not negative",
-    )
 }

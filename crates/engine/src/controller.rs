@@ -33,7 +33,7 @@ pub struct Attempts {
 /// Chooses the size of every step, looks at what a [scheme](solver::Scheme) makes of it, and takes it or not.
 ///
 /// A run that is resumed shows a new controller its records: what follows must depend on nothing else.
-pub trait Controller<const D: usize> {
+pub trait Controller<const D: usize>: Send {
     /// The size of the next attempt.
     fn next(&self) -> StepSize;
 

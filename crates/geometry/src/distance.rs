@@ -14,12 +14,12 @@ use crate::vector::{self, max};
 /// The signed distance to the boundary of a shape: negative inside, positive outside.
 ///
 /// Closures `Fn([f64; D]) -> f64 + Sync` implement it.
-pub trait SignedDistance<const D: usize>: Sync {
+pub trait SignedDistance<const D: usize>: Send + Sync {
     /// The signed distance of `x`.
     fn signed_distance(&self, x: [f64; D]) -> f64;
 }
 
-impl<const D: usize, F: Fn([f64; D]) -> f64 + Sync> SignedDistance<D> for F {
+impl<const D: usize, F: Fn([f64; D]) -> f64 + Send + Sync> SignedDistance<D> for F {
     fn signed_distance(&self, x: [f64; D]) -> f64 {
         self(x)
     }

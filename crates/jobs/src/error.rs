@@ -42,6 +42,9 @@ pub enum Error {
     /// Options that contradict each other, or do not fit the input.
     #[error(transparent)]
     Refused(#[from] Refusal),
+    /// Options by names that cannot be read.
+    #[error("{0}")]
+    Named(String),
     /// A grid that resolves nothing.
     #[error("`cells` {cells} resolves nothing: use at least {fewest} per unit length")]
     TooFewCells {

@@ -8,7 +8,7 @@ use runs::Interrupt;
 use crate::presentation::Topology;
 
 /// What looks after a job. By default nothing is told, and nothing interrupts it.
-pub trait Watcher {
+pub trait Watcher: Sync {
     /// Something that the person should know before trusting the result.
     fn warning(&self, _: &Warning) {}
 

@@ -1,10 +1,12 @@
 //! Inputs: files, their bytes in memory, and arrays.
 
+use std::any::Any;
 use std::borrow::Cow;
 use std::convert::Infallible;
 use std::fmt;
 use std::sync::Arc;
 
+use geometry::npy::NpyError;
 use volumes::Volume;
 
 use crate::prelude::*;
@@ -20,16 +22,15 @@ pub struct Input {
 #[derive(Clone)]
 pub(crate) enum Contents {
     Bytes(Arc<[u8]>),
+    Plane(Arc<Field<2>>),
+    Space(Arc<Field<3>>),
     Volume(Arc<Volume>),
 }
 
 impl Input {
     /// The bytes of a file of this name, whose extension says what they are.
     pub fn bytes(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
-        Self {
-            name: name.into(),
-            contents: Some(Contents::Bytes(bytes.into())),
-        }
+        Self::of_contents(name.into(), Contents::Bytes(bytes.into()))
     }
 
     /// A mesh. Its coordinates keep all their digits.
@@ -42,11 +43,33 @@ impl Input {
         Ok(Self::bytes(name, bytes))
     }
 
+    /// A picture: a drawing, or a mask.
+    ///
+    /// # Errors
+    /// A picture that cannot be encoded.
+    pub fn picture(name: &str, picture: &Picture) -> Result<Self> {
+        Ok(Self::bytes(format!("{name}.png"), picture.to_png()?))
+    }
+
+    /// A phase field or signed distances on a grid in the plane, which the flow keeps unless `cells` are chosen.
+    pub fn plane_field(name: &str, field: Field<2>) -> Self {
+        Self::of_contents(format!("{name}.npy"), Contents::Plane(Arc::new(field)))
+    }
+
+    /// A phase field or signed distances on a grid in space, which the flow keeps unless `cells` are chosen.
+    pub fn space_field(name: &str, field: Field<3>) -> Self {
+        Self::of_contents(format!("{name}.npy"), Contents::Space(Arc::new(field)))
+    }
+
     /// A segmentation, or a grey volume.
     pub fn volume(name: &str, volume: Volume) -> Self {
+        Self::of_contents(format!("{name}.nii"), Contents::Volume(Arc::new(volume)))
+    }
+
+    fn of_contents(name: String, contents: Contents) -> Self {
         Self {
-            name: format!("{name}.nii"),
-            contents: Some(Contents::Volume(Arc::new(volume))),
+            name,
+            contents: Some(contents),
         }
     }
 
@@ -175,8 +198,8 @@ impl File {
         Ok(match &self.contents {
             None => Cow::Owned(volumes::read(&self.path)?),
             Some(Contents::Volume(volume)) => Cow::Borrowed(volume),
-            Some(Contents::Bytes(bytes)) => {
-                let decoded = volumes::decode(bytes);
+            Some(_) => {
+                let decoded = volumes::decode(&self.read()?);
                 Cow::Owned(decoded.map_err(|problem| volumes::Error::Format {
                     path: self.path.clone(),
                     problem,
@@ -185,13 +208,43 @@ impl File {
         })
     }
 
+    /// Whether it is a field in the plane. Whatever else is wrong with a file is said when its values are read.
+    pub fn is_planar_field(&self) -> Result<bool> {
+        Ok(match &self.contents {
+            Some(Contents::Plane(_)) => true,
+            Some(Contents::Space(_)) => false,
+            _ => {
+                let decoded = npy::decode::<2>(&self.read()?);
+                !matches!(decoded, Err(NpyError::Rank { .. }))
+            }
+        })
+    }
+
+    /// The field in it, in `D` dimensions. The values of a file are on a grid about 0, in a box of this side.
+    pub fn field<const D: usize>(&self, side: f64) -> Result<Field<D>> {
+        let given = match &self.contents {
+            Some(Contents::Plane(field)) => (&**field as &dyn Any).downcast_ref(),
+            Some(Contents::Space(field)) => (&**field as &dyn Any).downcast_ref(),
+            _ => None,
+        };
+        if let Some(field) = given {
+            return Ok(Field::clone(field));
+        }
+        let decoded = npy::decode::<D>(&self.read()?);
+        let (cells, values) = decoded.map_err(|source| geometry::Error::Npy {
+            path: self.path.clone(),
+            source,
+        })?;
+        Ok(Field::from_values(Grid::centred(cells, side)?, values)?)
+    }
+
     /// Whether it is a stack of images, which is a volume.
     pub fn is_stack(&self) -> bool {
         match &self.contents {
             None => volumes::is_stack(&self.path),
             // A single image is no volume.
             Some(Contents::Bytes(bytes)) => volumes::decode(bytes).is_ok(),
-            Some(Contents::Volume(_)) => true,
+            Some(_) => true,
         }
     }
 }

@@ -1,7 +1,6 @@
 //! Inputs as phase fields.
 
 use engine::{Flow, Storage};
-use geometry::npy::{self, NpyError};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, Side, Tones};
 use surfaces::shapes::{self, BuiltIn};
@@ -39,6 +38,18 @@ pub enum Opened {
     Plane(Stored<2>),
     /// A surface.
     Space(Stored<3>),
+}
+
+impl From<Stored<2>> for Opened {
+    fn from(field: Stored<2>) -> Self {
+        Self::Plane(field)
+    }
+}
+
+impl From<Stored<3>> for Opened {
+    fn from(field: Stored<3>) -> Self {
+        Self::Space(field)
+    }
 }
 
 /// The phase field of an input, with interfaces so many cells wide; the grid is chosen unless the options say it, and noted there.
@@ -171,11 +182,7 @@ impl Source {
         Ok(match self {
             Self::Mesh(_) | Self::Volume(_) => false,
             Self::Image(_) => true,
-            // Whatever else is wrong with the file is said when its values are read.
-            Self::Field(file) => {
-                let decoded = npy::decode::<2>(&file.read()?);
-                !matches!(decoded, Err(NpyError::Rank { .. }))
-            }
+            Self::Field(file) => file.is_planar_field()?,
             Self::BuiltIn(name) => shapes::dimension(name)? == 2,
             Self::Region(region) => region.dimension() == 2,
         })
@@ -646,12 +653,9 @@ impl<'a> Reader<'a> {
         let kind = *self.options.field_kind.get_or_insert(FieldKind::PhaseField);
         let is_phase = kind == FieldKind::PhaseField;
         let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
-        let decoded = npy::decode::<D>(&file.read()?);
-        let (cells, values) = decoded.map_err(|source| geometry::Error::Npy {
-            path: file.path.clone(),
-            source,
-        })?;
-        let mut field = Field::from_values(Grid::centred(cells, side)?, values)?;
+        let mut field = file.field::<D>(side)?;
+        let origin = field.grid().origin();
+        self.options.box_side = Some(field.grid().side());
         let outside = field.values().iter().find(|u| u.abs() > LARGEST_PHASE);
         if let (true, Some(value)) = (is_phase, outside) {
             return Err(Error::NoPhase {
@@ -665,7 +669,8 @@ impl<'a> Reader<'a> {
                 let eps = self.eps(field.grid());
                 field = field.map(|u| distance_from_phase_field(u, eps));
             }
-            field = Field::from_fn(self.grid()?, |x| field.interpolate(x));
+            let grid = self.grid()?.with_origin(origin)?;
+            field = Field::from_fn(grid, |x| field.interpolate(x));
         }
         if !is_phase || self.options.cells.is_some() {
             let eps = self.eps(field.grid());

@@ -38,6 +38,7 @@ mod input;
 mod job;
 mod keep;
 mod made;
+mod named;
 mod notes;
 mod options;
 mod outcome;
@@ -53,6 +54,7 @@ mod sample;
 mod session;
 pub mod settings;
 mod space;
+mod steps;
 mod train;
 pub mod values;
 mod volume;
@@ -68,6 +70,7 @@ pub use functions::{LabelSurface, fair, flow, inpaint, mcf, repair, surfaces_of_
 pub use input::{Opened, open, usual_format};
 pub use job::Job;
 pub use made::{Curve, Made, MeshFile, Results, Shape, Surface};
+pub use named::{one_line, options_of};
 pub use notes::{About, NetworkNote, RunNotes};
 pub use options::{
     CheckOptions, CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions,
@@ -79,6 +82,7 @@ pub use page::write as write_page;
 pub use presentation::Topology;
 pub use refusal::Refusal;
 pub use sample::sample;
-pub use session::{resume, run_and_save, run_in_folder, run_in_memory};
+pub use session::{begin, resume, run_and_save, run_in_folder, run_in_memory};
+pub use steps::{StepState, Steps};
 pub use train::{TrainedNetwork, train};
 pub use volume::{labels, named};

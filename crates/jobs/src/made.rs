@@ -41,6 +41,18 @@ impl Results {
     }
 }
 
+impl From<Made<2>> for Results {
+    fn from(made: Made<2>) -> Self {
+        Self::Plane(made)
+    }
+}
+
+impl From<Made<3>> for Results {
+    fn from(made: Made<3>) -> Self {
+        Self::Space(made)
+    }
+}
+
 /// The results of a job in `D` dimensions.
 #[derive(Clone, Debug)]
 pub struct Made<const D: usize> {

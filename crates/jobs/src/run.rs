@@ -13,7 +13,7 @@ use solver::StepEstimates;
 use crate::events::Progress;
 use crate::faired::{Faired, MeshReport};
 use crate::file::Input;
-use crate::made::Made;
+use crate::made::{Made, Shape};
 use crate::notes::{About, NetworkNote, RunNotes};
 use crate::options::{InputOptions, RunOptions};
 use crate::outcome::{GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
@@ -102,6 +102,11 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         if !self.advance(None, &mut run)? {
             return Err(Error::Interrupted);
         }
+        self.made(&run)
+    }
+
+    /// The results so far, in memory.
+    pub fn made(&self, run: &Run<D>) -> Result<Made<D>> {
         let (u, eps) = (run.stored(), run.case().scales.eps);
         let (mut mesh, mut topology, mut shape) = (None, Topology::default(), None);
         if has_interface(u) {
@@ -111,12 +116,21 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             shape = Some(self.presentation.shape(u, eps, faired)?);
         }
         Ok(Made {
-            summary: self.summary(&run, topology, mesh),
+            summary: self.summary(run, topology, mesh),
             ended: run.ended(),
             records: run.records().to_vec(),
             field: u.clone(),
             shape,
         })
+    }
+
+    /// The shape of a phase field of the run that began at `start`, unless it has vanished.
+    pub fn shape(&self, start: &Stored<D>, u: &Stored<D>, eps: f64) -> Result<Option<Shape>> {
+        if !has_interface(u) {
+            return Ok(None);
+        }
+        let faired = self.presentation.faired(start, u, eps)?;
+        Ok(Some(self.presentation.shape(u, eps, faired)?))
     }
 
     /// Makes the steps, and says whether the run is over and was not interrupted.

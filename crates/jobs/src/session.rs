@@ -3,7 +3,8 @@
 use engine::{Flow, Storage, Store};
 
 use crate::case::with_round_edges;
-use crate::input::{InitialShape, Loaded, Reader};
+use crate::events::Silent;
+use crate::input::{InitialShape, Loaded, Opened, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::notes::RunNotes;
@@ -16,6 +17,7 @@ use crate::presentation::{self, Presentation};
 use crate::run::{Plan, free_folder, make_way};
 use crate::settings;
 use crate::space::Space;
+use crate::steps::Steps;
 
 impl ForceOption {
     /// Refuses a file to save that is there, or whose folder is not.
@@ -122,6 +124,19 @@ pub fn run_in_memory(mut job: Job, watcher: &dyn Watcher) -> Result<Results> {
         Loaded::Plane(start) => Results::Plane(session.make(start)?),
         Loaded::Space(start) => Results::Space(session.make(start)?),
     })
+}
+
+/// Begins a job in memory whose steps are made one at a time. Nothing is written: options of files are ignored.
+///
+/// # Errors
+/// Refused options or input.
+pub fn begin(mut job: Job, watcher: &dyn Watcher) -> Result<Steps> {
+    job.options().save = None;
+    let (session, loaded) = Session::load(job, watcher)?;
+    match loaded {
+        Loaded::Plane(start) => session.begin(start),
+        Loaded::Space(start) => session.begin(start),
+    }
 }
 
 /// Continues a stored run, perhaps to more steps, with the options that it was started with: those of its [file](crate::settings::FILE).
@@ -231,6 +246,21 @@ impl<'a> Session<'a> {
         let (case, presentation) = self.prepare(start)?;
         let run = Run::new(case, &self.device)?;
         self.plan(presentation).make(run)
+    }
+
+    fn begin<const D: usize, O>(mut self, start: InitialShape<D, O>) -> Result<Steps>
+    where
+        O: Presentation<D> + Send + Sync + 'static,
+        Made<D>: Into<Results>,
+        Stored<D>: Into<Opened>,
+    {
+        let (case, presentation) = self.prepare(start)?;
+        let run = Run::new(case, &self.device)?;
+        let plan = Plan {
+            watcher: &Silent,
+            ..self.plan(presentation)
+        };
+        Ok(Steps::new(plan, run))
     }
 
     fn start<const D: usize, O: Presentation<D>>(

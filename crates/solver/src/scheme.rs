@@ -38,7 +38,7 @@ pub struct Candidate<const D: usize> {
 
 /// A time step as a function: of a problem, a state and a size. What is traced or uploaded for a problem may be kept from one step to the next; what
 /// a result depends on is in the state.
-pub trait Scheme<const D: usize> {
+pub trait Scheme<const D: usize>: Send {
     /// One step.
     ///
     /// # Errors

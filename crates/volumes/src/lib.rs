@@ -57,5 +57,5 @@ mod write;
 pub use body::{Body, Inside};
 pub use error::{Error, FormatError};
 pub use read::{decode, is_stack, read};
-pub use volume::Volume;
+pub use volume::{Values, Volume};
 pub use write::write;

@@ -1,7 +1,7 @@
 //! Values on a lattice in space.
 
 use files::Number;
-use glam::{DAffine3, DMat3};
+use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::{Error, FormatError};
@@ -36,6 +36,40 @@ impl Voxels {
     }
 }
 
+/// The values of voxels.
+#[derive(Clone, Debug)]
+pub enum Values {
+    /// Small labels, or grey values of eight bits.
+    U8(Vec<u8>),
+    /// Labels.
+    I32(Vec<i32>),
+    /// Grey values.
+    F32(Vec<f32>),
+    /// Grey values in double precision.
+    F64(Vec<f64>),
+}
+
+impl Values {
+    /// Their kind and their bytes, the lowest first.
+    fn as_bytes(&self) -> (Number, Vec<u8>) {
+        match self {
+            Self::U8(values) => (Number::U8, values.clone()),
+            Self::I32(values) => (
+                Number::I32,
+                values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            ),
+            Self::F32(values) => (
+                Number::F32,
+                values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            ),
+            Self::F64(values) => (
+                Number::F64,
+                values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            ),
+        }
+    }
+}
+
 impl Volume {
     /// Labels in a row, the first axis fastest, of voxels with these sides, finite and positive, from the centre of the first one. There
     /// are two voxels along each axis at least, and as many labels as voxels.
@@ -53,6 +87,29 @@ impl Volume {
         };
         let matrix = DMat3::from_diagonal(sides.into());
         let frame = DAffine3::from_mat3_translation(matrix, origin.into());
+        Self::new(size, frame, voxels).map_err(Error::Volume)
+    }
+
+    /// Values in a row, the first axis fastest, one for each voxel. Column `i` of `affine`, for `i` from 0 to 2, is the step from one voxel to the
+    /// next along axis `i`, and its last column is the centre of the first voxel, as in NIfTI.
+    ///
+    /// # Errors
+    /// [`Error::Volume`]: fewer than two voxels along an axis, another number of values, values that are not finite, and an affine map that
+    /// has no inverse.
+    pub fn of_values(
+        size: [usize; 3],
+        affine: [[f64; 4]; 3],
+        values: &Values,
+    ) -> Result<Self, Error> {
+        let (element, bytes) = values.as_bytes();
+        let voxels = Voxels {
+            bytes,
+            element,
+            big_endian: false,
+            scale: [1.0, 0.0],
+        };
+        let column = |j: usize| DVec3::from_array([0, 1, 2].map(|i| affine[i][j]));
+        let frame = DAffine3::from_cols(column(0), column(1), column(2), column(3));
         Self::new(size, frame, voxels).map_err(Error::Volume)
     }
 
