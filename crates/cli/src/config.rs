@@ -1,4 +1,4 @@
-//! Options from files, and resolved options as files.
+//! Options from files.
 //!
 //! A file has a line `name = value` for every option, named as on the command line; `input` is the input. What it says is put
 //! before what was typed and parsed in the same way, so that both accept the same and refuse the same.
@@ -17,14 +17,11 @@ use std::path::{Path, PathBuf};
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use toml::{Table, Value};
 
-use jobs::settings::COMMAND;
+use jobs::settings::{COMMAND, INPUT, LONGEST, option, parse as parse_table};
 
 use crate::cli::Cli;
 use crate::error::{Error, Result, refuse};
 use crate::spelling::spelled;
-
-/// Longest configuration file, in bytes; all options take some thousand.
-const LONGEST: usize = 1 << 16;
 
 /// Of other options the last one counts; a second one of these might be meant to add to the first.
 const ALONE: [&str; 3] = ["--keep", "--mask", "--label"];
@@ -86,23 +83,11 @@ fn parse_both(
     text: &str,
     path: &Path,
 ) -> Result<Cli> {
-    let mut table = read(text, path)?;
+    let mut table = parse_table(text, path)?;
     if typed.try_contains_id("input").unwrap_or(false) {
-        table.remove("input");
+        table.remove(INPUT);
     }
     with_table(arguments, command, &table, path)
-}
-
-/// The options that a run was started with.
-pub fn parse_resolved(text: &str, path: &Path) -> Result<Cli> {
-    let table = read(text, path)?;
-    let Some(Value::String(command)) = table.get(COMMAND) else {
-        return Err(bad(path, "it does not say which command it is for"));
-    };
-    if program().find_subcommand(command).is_none() {
-        return Err(bad(path, format!("{command:?} is no command")));
-    }
-    with_table(&["willmore".into(), command.into()], command, &table, path)
 }
 
 /// Puts the entries of a file behind the command.
@@ -122,39 +107,24 @@ fn bad(path: &Path, message: impl AsRef<str>) -> Error {
     Error::Options(format!("{}: {message}", path.display()))
 }
 
-fn read(text: &str, path: &Path) -> Result<Table> {
-    if text.len() > LONGEST {
-        let most = format!("a configuration has at most {LONGEST} bytes");
-        return Err(bad(path, most));
-    }
-    text.parse::<Table>().map_err(|error| {
-        let before = error.span().map_or("", |span| &text[..span.start]);
-        let line = 1 + before.matches('\n').count();
-        bad(path, format!("line {line}: {}", error.message()))
-    })
-}
-
 /// The entries of a file as they would be typed.
 fn as_typed(table: &Table, command: &str, path: &Path) -> Result<Vec<OsString>> {
-    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let mut arguments = Vec::new();
     for (name, value) in table {
         let typed = match (&**name, value) {
             (COMMAND, Value::String(of)) if of == command => continue,
             (COMMAND, of) => Err(format!("it is for the command {of}, not for {command}")),
             ("config", _) => Err("a configuration cannot name another one".to_owned()),
-            ("" | "help" | "version", _) => Err(format!("{name:?} is no option")),
-            _ if !name.chars().all(is_name) => Err(format!("{name:?} is no option")),
-            (_, Value::Boolean(false)) => continue,
-            (_, Value::Boolean(true)) => Ok(format!("--{name}")),
-            ("input", Value::String(text)) if text.starts_with('-') => Err(format!(
+            (INPUT, Value::String(text)) if text.starts_with('-') => Err(format!(
                 "the input {text:?} looks like an option: put ./ before it"
             )),
-            ("input", Value::String(text)) => Ok(text.clone()),
-            (_, Value::String(text)) => Ok(format!("--{name}={text}")),
-            (_, Value::Integer(number)) => Ok(format!("--{name}={number}")),
-            (_, Value::Float(number)) => Ok(format!("--{name}={number}")),
-            _ => Err(format!("{name} must be a number, a text, true or false")),
+            (INPUT, Value::String(text)) => Ok(text.clone()),
+            _ => match option(name, value) {
+                Ok(None) => continue,
+                Ok(Some((name, None))) => Ok(format!("--{name}")),
+                Ok(Some((name, Some(value)))) => Ok(format!("--{name}={value}")),
+                Err(problem) => Err(problem),
+            },
         };
         arguments.push(typed.map_err(|message| bad(path, message))?.into());
     }

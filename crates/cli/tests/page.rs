@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use willmore::prelude::{FlowOptions, Interrupt, Job, Watcher, run_in_folder};
+
 use crate::common::{files, outcome, run, text};
 
 const RUN: [&str; 8] = [
@@ -56,6 +58,36 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
         assert!(
             html.contains(">time step<") && !html.contains(">hvp<"),
             "{name}"
+        );
+    }
+}
+
+/// What there is of a run that was interrupted is shown.
+#[test]
+fn a_run_that_is_not_finished_shows_its_surface() {
+    struct Impatient(Interrupt);
+
+    impl Watcher for Impatient {
+        fn interrupt(&self) -> Result<Interrupt, willmore::runs::Error> {
+            Ok(self.0.clone())
+        }
+    }
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut options = FlowOptions::of("builtin:cube");
+    options.input.cells = Some(24);
+    (options.run.steps, options.run.frames) = (Some(3), Some(1));
+    options.run.output = Some(folder.path().join("run"));
+    let watcher = Impatient(Interrupt::never());
+    watcher.0.request();
+    let outcome = run_in_folder(Job::Flow(options), &watcher).unwrap();
+    assert!(outcome.summary.is_none() && outcome.steps == 1);
+    let html = page(folder.path(), "run");
+    assert!(html.contains("Not finished: 1 step"));
+    for label in ["before", "step 1"] {
+        assert!(
+            html.contains(&format!("data-label=\"{label}\"")),
+            "{label}"
         );
     }
 }

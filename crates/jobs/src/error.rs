@@ -1,7 +1,7 @@
 //! Why a job refuses its input or its options, or stops.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::events::{Loss, ThinParts};
 use crate::refusal::Refusal;
@@ -42,6 +42,14 @@ pub enum Error {
     /// Options that contradict each other, or do not fit the input.
     #[error(transparent)]
     Refused(#[from] Refusal),
+    /// A file of options that cannot be read.
+    #[error("{}: {problem}", path.display())]
+    Settings {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// Options by names that cannot be read.
     #[error("{0}")]
     Named(String),
@@ -261,6 +269,14 @@ impl From<engine::Error> for Error {
 }
 
 impl Error {
+    /// Of a file of options. Messages on damaged files may be as long as these.
+    pub(crate) fn settings(path: &Path, problem: &str) -> Self {
+        Self::Settings {
+            path: path.to_owned(),
+            problem: files::shortened(problem, 400),
+        }
+    }
+
     pub(crate) fn foreign(
         option: &'static str,
         value: impl fmt::Display,

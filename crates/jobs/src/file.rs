@@ -27,6 +27,17 @@ pub(crate) enum Contents {
     Volume(Arc<Volume>),
 }
 
+impl Contents {
+    /// The field, if it is one in `D` dimensions.
+    fn field<const D: usize>(&self) -> Option<&Field<D>> {
+        match self {
+            Self::Plane(field) => (&**field as &dyn Any).downcast_ref(),
+            Self::Space(field) => (&**field as &dyn Any).downcast_ref(),
+            Self::Bytes(_) | Self::Volume(_) => None,
+        }
+    }
+}
+
 impl Input {
     /// The bytes of a file of this name, whose extension says what they are.
     pub fn bytes(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
@@ -80,6 +91,16 @@ impl Input {
 
     pub(crate) fn is_in_memory(&self) -> bool {
         self.contents.is_some()
+    }
+
+    /// Whether it is a region by its name.
+    pub(crate) fn is_region(&self) -> bool {
+        !self.is_in_memory() && Region::is_meant(&self.name)
+    }
+
+    /// The field that it is, if it is one in memory and in `D` dimensions.
+    pub(crate) fn in_memory_field<const D: usize>(&self) -> Option<Field<D>> {
+        self.contents.as_ref()?.field().cloned()
     }
 
     /// The file that it names; its path is absolute unless it is in memory.
@@ -222,13 +243,8 @@ impl File {
 
     /// The field in it, in `D` dimensions. The values of a file are on a grid about 0, in a box of this side.
     pub fn field<const D: usize>(&self, side: f64) -> Result<Field<D>> {
-        let given = match &self.contents {
-            Some(Contents::Plane(field)) => (&**field as &dyn Any).downcast_ref(),
-            Some(Contents::Space(field)) => (&**field as &dyn Any).downcast_ref(),
-            _ => None,
-        };
-        if let Some(field) = given {
-            return Ok(Field::clone(field));
+        if let Some(field) = self.contents.as_ref().and_then(Contents::field) {
+            return Ok(field.clone());
         }
         let decoded = npy::decode::<D>(&self.read()?);
         let (cells, values) = decoded.map_err(|source| geometry::Error::Npy {

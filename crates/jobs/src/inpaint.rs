@@ -1,17 +1,17 @@
+use crate::file::Input;
 use crate::input::{InitialShape, Loaded};
 use crate::options::InpaintOptions;
-use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::Ansatz;
 
 impl InpaintOptions {
     pub(crate) fn check(&mut self) -> Result<()> {
-        let Some(mask) = &self.mask else {
+        let Some(mask) = &mut self.mask else {
             return Err(Refusal::NoMask.into());
         };
-        if !Region::is_meant(mask) {
-            let absolute = absolute(mask)?;
-            self.mask = Some(absolute.to_string_lossy().into_owned());
+        if !mask.is_region() {
+            let file = mask.file()?;
+            mask.rename(&file.path);
         }
         Ok(())
     }
@@ -19,18 +19,23 @@ impl InpaintOptions {
     pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
         let mut reader = self.input.reader(&self.operator, device, watcher)?;
         let loaded = reader.load()?;
-        let mask = self.mask.as_deref().unwrap_or_default();
+        let mask = self.mask.as_ref().ok_or(Refusal::NoMask)?;
         Ok(match loaded {
             Loaded::Plane(mut start) => {
-                let shape = if Region::is_meant(mask) {
-                    region(mask)?
-                } else {
-                    start.presentation.mask(mask, start.initial.grid())?
+                let shape = match region(mask)? {
+                    Some(region) => region,
+                    None => start.presentation.mask(mask, start.initial.grid())?,
                 };
                 start.presentation.repair(shape.as_ref(), watcher)?;
                 Loaded::Plane(self.restricted(start, shape.as_ref())?)
             }
-            Loaded::Space(start) => Loaded::Space(self.restricted(start, region(mask)?.as_ref())?),
+            Loaded::Space(start) => {
+                let shape = region(mask)?.ok_or_else(|| Refusal::MaskOfImage {
+                    mask: mask.to_string(),
+                    dimension: 3,
+                })?;
+                Loaded::Space(self.restricted(start, shape.as_ref())?)
+            }
         })
     }
 
@@ -46,7 +51,10 @@ impl InpaintOptions {
         let region: NodeSet = (0..grid.len()).map(inside).collect();
         if region.is_empty() {
             return Err(Refusal::MaskWithoutNodes {
-                mask: self.mask.clone().unwrap_or_default(),
+                mask: self
+                    .mask
+                    .as_ref()
+                    .map_or_else(String::new, Input::to_string),
                 origin: grid.origin().to_vec(),
                 side: grid.side(),
             }
@@ -68,19 +76,19 @@ impl InpaintOptions {
     }
 }
 
-/// A region that is a mask.
-fn region<const D: usize>(mask: &str) -> Result<Box<dyn SignedDistance<D>>> {
-    if !Region::is_meant(mask) {
-        return Err(Refusal::MaskOfImage {
-            mask: mask.to_owned(),
-            dimension: D,
-        }
-        .into());
+/// The region of a mask that is no image: a shape by its name, or the nodes of a field where it is negative.
+fn region<const D: usize>(mask: &Input) -> Result<Option<Box<dyn SignedDistance<D>>>> {
+    if let Some(field) = mask.in_memory_field::<D>() {
+        let nearest = move |x: [f64; D]| field.values()[field.grid().nearest(x)];
+        return Ok(Some(Box::new(nearest)));
     }
-    let region: Region = mask.parse().map_err(|reason| Refusal::Value {
+    if !mask.is_region() {
+        return Ok(None);
+    }
+    let region: Region = mask.name().parse().map_err(|reason| Refusal::Value {
         option: "mask",
         value: None,
         reason,
     })?;
-    Ok(region.shape::<D>()?)
+    Ok(Some(region.shape::<D>()?))
 }

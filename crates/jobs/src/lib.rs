@@ -84,5 +84,5 @@ pub use refusal::Refusal;
 pub use sample::sample;
 pub use session::{begin, resume, run_and_save, run_in_folder, run_in_memory};
 pub use steps::{StepState, Steps};
-pub use train::{TrainedNetwork, train};
+pub use train::{TrainedNetwork, train, train_and_save};
 pub use volume::{labels, named};

@@ -12,7 +12,7 @@ use crate::prelude::*;
 /// # fn main() -> Result<(), jobs::Error> {
 /// let named = [("cells", Some("24".to_owned())), ("no_page", None)];
 /// let options: FlowOptions = jobs::options_of(named)?;
-/// assert_eq!(options.run.input.cells, Some(24));
+/// assert_eq!(options.input.cells, Some(24));
 /// let error = jobs::options_of::<FlowOptions>([("steps", Some("few".to_owned()))]);
 /// assert!(error.unwrap_err().to_string().contains("`steps`"));
 /// # Ok(())
@@ -51,6 +51,7 @@ pub fn one_line(error: &clap::Error) -> String {
         "invalid digit found in string",
         "it must be a whole number, not negative",
     )
+    .replace(" tip: ", "; ")
 }
 
 /// A message in which options stand as fields: `'--side-length <LENGTH>'` is `side_length`, in backticks.

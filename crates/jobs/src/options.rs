@@ -447,7 +447,7 @@ pub struct InpaintOptions {
     /// region consists of the opaque pixels if some pixels are transparent. Otherwise it consists of the dark pixels, or of the light ones if most of
     /// the border is dark.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = INPUT)]
-    pub mask: Option<String>,
+    pub mask: Option<Input>,
 
     /// Shape in the region at the beginning: keep, empty, full, box:... or ball:...
     #[arg(long, value_name = "SHAPE", default_value = "keep", help_heading = FLOW)]
@@ -619,7 +619,7 @@ impl FairOptions {
 
 impl InpaintOptions {
     /// The options for this input and the region to fill, with the defaults of the program.
-    pub fn of(input: impl Into<Input>, mask: impl Into<String>) -> Self {
+    pub fn of(input: impl Into<Input>, mask: impl Into<Input>) -> Self {
         Self {
             input: InputOptions::of(input),
             mask: Some(mask.into()),

@@ -108,7 +108,7 @@ impl Files<'_> {
 
     fn surfaces(&self) -> Result<Option<Markup>> {
         let stages = self.stages(&MESHES);
-        let Some((_, first)) = stages.first().filter(|_| self.has(presentation::PICTURE)) else {
+        let Some((_, first)) = stages.first() else {
             return Ok(None);
         };
         let read = |name: &str| surfaces::read(self.run.path().join(name));

@@ -4,7 +4,7 @@ use images::{Frame, Image, Outline, Side, drawing, interface};
 use render::Rgb;
 
 use crate::faired::Faired;
-use crate::file::File;
+use crate::file::{File, Input};
 use crate::made::{Curve, Shape};
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
@@ -50,12 +50,12 @@ impl Plane {
     }
 
     /// What is inside a mask that is an image: of the size of the input, or else a square, which fills the box.
-    pub fn mask(&self, mask: &str, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>> {
-        let image = images::read(mask)?;
+    pub fn mask(&self, mask: &Input, grid: &Grid<2>) -> Result<Box<dyn SignedDistance<2>>> {
+        let image = mask.file()?.image()?;
         let (size, of_input) = (image.size(), self.frame.size());
         if self.image.is_some() && size != of_input {
             return Err(Refusal::MaskSize {
-                mask: mask.to_owned(),
+                mask: mask.to_string(),
                 size,
                 of_input,
             }
@@ -63,7 +63,7 @@ impl Plane {
         }
         if self.image.is_none() && size[0] != size[1] {
             return Err(Refusal::MaskNotSquare {
-                mask: mask.to_owned(),
+                mask: mask.to_string(),
                 size,
             }
             .into());

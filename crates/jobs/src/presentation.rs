@@ -14,7 +14,6 @@ use crate::prelude::*;
 /// Names of files that hold the shape at the beginning, without their extension.
 pub const START: &str = "start";
 pub const FINAL: &str = "final";
-pub const PICTURE: &str = "final.png";
 pub const DISPLACEMENT: &str = "final.displacement.svg";
 pub const FRAMES: &str = "frames";
 /// The files of a frame without their extensions.

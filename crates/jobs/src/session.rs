@@ -131,8 +131,8 @@ pub fn run_in_memory(mut job: Job, watcher: &dyn Watcher) -> Result<Results> {
 /// # Errors
 /// Refused options or input.
 pub fn begin(mut job: Job, watcher: &dyn Watcher) -> Result<Steps> {
-    job.options().save = None;
-    let (session, loaded) = Session::load(job, watcher)?;
+    job.run().save = None;
+    let (session, loaded) = Session::load(job, None, watcher)?;
     match loaded {
         Loaded::Plane(start) => session.begin(start),
         Loaded::Space(start) => session.begin(start),

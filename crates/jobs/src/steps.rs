@@ -15,7 +15,7 @@ use crate::run::Plan;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut options = FlowOptions::of("builtin:cross");
-/// options.run.input.cells = Some(24);
+/// options.input.cells = Some(24);
 /// options.run.steps = Some(3);
 /// for record in jobs::begin(Job::Flow(options), &Silent)? {
 ///     println!("t = {:.1e}", record?.time);

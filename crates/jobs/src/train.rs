@@ -2,7 +2,7 @@
 
 use engine::quarter_square;
 use mean_curvature::Calibration;
-use model::Ratios;
+use model::{Network, Ratios};
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, SphereData, Training, TrainingProgress};
 
@@ -17,11 +17,11 @@ const HELD_OUT: usize = 20;
 /// The same for a network of seconds.
 const HELD_OUT_QUICK: usize = 2;
 
-/// A network that was trained and written.
+/// A network that was trained.
 #[derive(Clone, Debug)]
 pub struct TrainedNetwork {
-    /// Its file.
-    pub file: PathBuf,
+    /// The network.
+    pub network: Network,
     /// What it is for.
     pub ratios: Ratios,
     /// Its loss on spheres that it has not seen.
@@ -47,14 +47,29 @@ impl TrainOptions {
     }
 }
 
-/// Trains a network and writes it to the file of `save`.
+/// Trains a network and writes it to the file of `save`, which is returned.
+///
+/// # Errors
+/// As [`train`], and a file that is there or cannot be written.
+pub fn train_and_save(
+    options: TrainOptions,
+    watcher: &dyn Watcher,
+) -> Result<(PathBuf, TrainedNetwork)> {
+    options.ratios()?;
+    let file = options.save.clone();
+    let file = file.ok_or(Refusal::TrainNeeds { option: "save" })?;
+    options.force.check(&file)?;
+    let trained = train(options, watcher)?;
+    trained.network.save(&file)?;
+    Ok((file, trained))
+}
+
+/// Trains a network in memory. Options of files are ignored.
 ///
 /// # Errors
 /// Refused options; a training that fails; [`Error::Interrupted`], after which nothing is kept.
 pub fn train(mut options: TrainOptions, watcher: &dyn Watcher) -> Result<TrainedNetwork> {
     let ratios = options.ratios()?;
-    let file = (options.save.take()).ok_or(Refusal::TrainNeeds { option: "save" })?;
-    options.force.check(&file)?;
     let device = options.common.open_device()?;
     let cells = (CELLS * ratios.eps_over_h / 2.0).round() as usize;
     let mut data = SphereData::new(ratios, cells)?;
@@ -86,9 +101,8 @@ pub fn train(mut options: TrainOptions, watcher: &dyn Watcher) -> Result<Trained
         error => error.into(),
     })?;
     let calibration = trained.network.calibration()?;
-    trained.network.save(&file)?;
     Ok(TrainedNetwork {
-        file,
+        network: trained.network,
         ratios,
         held_out_loss: trained.quality.held_out_loss,
         calibration,

@@ -4,10 +4,9 @@ use runs::RunDirectory;
 use serde_json::json;
 
 use super::run::tell;
-use crate::cli::{Command, ResumeOptions};
-use crate::config;
+use crate::cli::ResumeOptions;
 use crate::console::Console;
-use crate::error::{Result, refuse};
+use crate::error::Result;
 
 /// Continues a run by the options and the state that it stored; its input is not needed again.
 pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
@@ -16,13 +15,7 @@ pub fn run(options: &ResumeOptions, console: &Console) -> Result<()> {
     } else {
         RunDirectory::open(&options.run)?
     };
-    let path = options.run.join(settings::FILE);
-    let parsed = config::parse_resolved(&stored.read_text(settings::FILE)?, &path)?;
-    let Command::Run(command) = parsed.command else {
-        let path = path.display();
-        refuse!("{path} names no command that makes runs");
-    };
-    let mut job = command.job();
+    let mut job = settings::job_of(&stored)?;
     let stored_options = job.run();
     // A run that was over may have written the file of --save itself.
     let notes = RunNotes::of(&stored)?;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 
 /// Trains a network and writes it to a file.
 pub fn run(options: TrainOptions, console: &Console) -> Result<()> {
-    let trained = match jobs::train(options, console) {
+    let (file, trained) = match jobs::train_and_save(options, console) {
         Err(jobs::Error::Interrupted) => {
             console.warn("interrupted: nothing of the training is kept");
             return Err(Error::Interrupted);
@@ -16,12 +16,12 @@ pub fn run(options: TrainOptions, console: &Console) -> Result<()> {
     let (ratios, loss) = (trained.ratios, trained.held_out_loss);
     let outcome = json!({
         "command": "train",
-        "file": trained.file.to_string_lossy(),
+        "file": file.to_string_lossy(),
         "ratios": ratios,
         "held_out_loss": loss,
         "calibration": trained.calibration,
     });
-    let shown = trained.file.display();
+    let shown = file.display();
     let text = format!("{ratios}: held-out loss {loss:.2e}; written to {shown}");
     console.report(&outcome, &text)
 }
