@@ -1,0 +1,258 @@
+//! Jobs: in memory, step by step, and in folders.
+
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use willmore::jobs::{
+    self, Job, Opened, Results, StepState,
+    Steps, settings,
+};
+use willmore::prelude as w;
+
+use crate::error::{Error, detached, of_job, raised};
+use crate::input::Input;
+use crate::shape::{FieldArray, PyShape, field_array};
+use crate::watcher::PyWatcher;
+
+/// Options by the names of the library. None stands for a flag.
+pub type Options = Vec<(String, Option<String>)>;
+
+/// Options from their names.
+pub fn read<O: clap::Args>(options: &Options) -> PyResult<O> {
+    let named = options.iter().map(|(name, value)| (&**name, value.clone()));
+    jobs::options_of(named).map_err(of_job)
+}
+
+/// A job from its name, its options, and the mask of an inpainting.
+fn job(name: &str, input: &Input, options: &Options, mask: Option<&Input>) -> PyResult<Job> {
+    let mut job = match name {
+        "flow" => Job::Flow(read(options)?),
+        "fair" => Job::Fair(read(options)?),
+        "inpaint" => Job::Inpaint(read(options)?),
+        "mcf" => Job::Mcf(read(options)?),
+        _ => return Err(Error::new_err(format!("{name:?} is no job"))),
+    };
+    job.input().input = Some(input.0.clone());
+    if let Job::Inpaint(inpaint) = &mut job {
+        inpaint.mask = mask.map(|mask| mask.0.clone());
+    }
+    Ok(job)
+}
+
+pub fn json(value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| raised(&error))
+}
+
+/// The results of a job.
+#[pyclass(frozen, module = "willmore._willmore", name = "Results")]
+pub struct PyResults {
+    results: Results,
+    #[pyo3(get)]
+    warnings: Vec<String>,
+    #[pyo3(get)]
+    notes: Vec<String>,
+}
+
+#[pymethods]
+impl PyResults {
+    /// What is known of the run, as JSON.
+    #[getter]
+    fn report(&self) -> PyResult<String> {
+        json(self.results.summary())
+    }
+
+    /// Energies, sizes and costs of every step, as JSON.
+    #[getter]
+    fn records(&self) -> PyResult<String> {
+        json(&self.results.records())
+    }
+
+    /// The rule that ended the run.
+    #[getter]
+    fn ended(&self) -> Option<String> {
+        let ended = match &self.results {
+            Results::Plane(made) => &made.ended,
+            Results::Space(made) => &made.ended,
+        };
+        ended.as_ref().map(ToString::to_string)
+    }
+
+    #[getter]
+    fn shape(&self) -> PyShape {
+        PyShape(self.results.shape().cloned())
+    }
+
+    #[getter]
+    fn field<'py>(&self, py: Python<'py>) -> PyResult<FieldArray<'py>> {
+        field_array(
+            py,
+            &match &self.results {
+                Results::Plane(made) => Opened::Plane(made.field.clone()),
+                Results::Space(made) => Opened::Space(made.field.clone()),
+            },
+        )
+    }
+}
+
+/// Does a job in memory.
+#[pyfunction]
+#[pyo3(signature = (name, input, options, progress=None, mask=None))]
+pub fn run(
+    py: Python<'_>,
+    name: &str,
+    input: &Input,
+    options: Options,
+    progress: Option<Py<PyAny>>,
+    mask: Option<&Input>,
+) -> PyResult<PyResults> {
+    let job = job(name, input, &options, mask)?;
+    let watcher = PyWatcher::new(progress);
+    let made = detached(py, || jobs::run_in_memory(job, &watcher).map_err(of_job));
+    let results = watcher.check(made)?;
+    Ok(PyResults {
+        results,
+        warnings: watcher.warnings(),
+        notes: watcher.notes(),
+    })
+}
+
+/// Does a job in a folder, and returns what came out, as JSON. Interrupted, it can be resumed.
+#[pyfunction]
+#[pyo3(signature = (name, input, options, progress=None, mask=None))]
+pub fn run_in_folder(
+    py: Python<'_>,
+    name: &str,
+    input: &Input,
+    options: Options,
+    progress: Option<Py<PyAny>>,
+    mask: Option<&Input>,
+) -> PyResult<(String, Vec<String>)> {
+    let job = job(name, input, &options, mask)?;
+    let watcher = PyWatcher::new(progress);
+    let made = detached(py, || jobs::run_in_folder(job, &watcher).map_err(of_job));
+    let outcome = watcher.check(made)?;
+    Ok((outcome.to_json().to_string(), watcher.warnings()))
+}
+
+/// Continues the run in a folder, perhaps to more steps.
+#[pyfunction]
+#[pyo3(signature = (folder, steps=None, progress=None))]
+pub fn resume(
+    py: Python<'_>,
+    folder: &str,
+    steps: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, Vec<String>)> {
+    let watcher = PyWatcher::new(progress);
+    let made = detached(py, || {
+        let stored = w::RunDirectory::open(folder).map_err(|error| raised(&error))?;
+        let mut job = settings::job_of(&stored).map_err(of_job)?;
+        // A run that was over may have written the file of `save` itself.
+        job.run().force.force |= stored.is_finished();
+        jobs::resume(job, stored, steps, &watcher).map_err(of_job)
+    });
+    let outcome = watcher.check(made)?;
+    Ok((outcome.to_json().to_string(), watcher.warnings()))
+}
+
+/// A job that makes a step when it is asked for one.
+#[pyclass(frozen, module = "willmore._willmore", name = "Steps")]
+pub struct PySteps {
+    steps: Mutex<Steps>,
+    #[pyo3(get)]
+    dimension: usize,
+    #[pyo3(get)]
+    warnings: Vec<String>,
+    #[pyo3(get)]
+    notes: Vec<String>,
+}
+
+impl PySteps {
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut Steps) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        detached(py, || {
+            act(&mut self.steps.lock().unwrap_or_else(PoisonError::into_inner))
+        })
+    }
+}
+
+#[pymethods]
+impl PySteps {
+    /// Makes a step, and returns its record as JSON; nothing once the flow is over.
+    fn step(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |steps| {
+            let record = steps.next().transpose().map_err(of_job)?;
+            record.as_ref().map(json).transpose()
+        })
+    }
+
+    /// The measures at the beginning, as JSON.
+    #[getter]
+    fn start(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |steps| json(steps.start()))
+    }
+
+    #[getter]
+    fn state(&self, py: Python<'_>) -> PyResult<PyState> {
+        self.with(py, |steps| Ok(PyState(steps.state())))
+    }
+
+    #[getter]
+    fn ended(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |steps| {
+            Ok(steps.ended().as_ref().map(w::Stop::to_string))
+        })
+    }
+
+    /// The results so far.
+    fn results(&self, py: Python<'_>) -> PyResult<PyResults> {
+        let results = self.with(py, |steps| steps.results().map_err(of_job))?;
+        Ok(PyResults {
+            results,
+            warnings: self.warnings.clone(),
+            notes: self.notes.clone(),
+        })
+    }
+}
+
+/// Begins a job whose steps are made one at a time.
+#[pyfunction]
+#[pyo3(signature = (name, input, options, progress=None))]
+pub fn begin(
+    py: Python<'_>,
+    name: &str,
+    input: &Input,
+    options: Options,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<PySteps> {
+    let job = job(name, input, &options, None)?;
+    let watcher = PyWatcher::new(progress);
+    let begun = detached(py, || jobs::begin(job, &watcher).map_err(of_job));
+    let steps = watcher.check(begun)?;
+    Ok(PySteps {
+        dimension: steps.dimension(),
+        steps: Mutex::new(steps),
+        warnings: watcher.warnings(),
+        notes: watcher.notes(),
+    })
+}
+
+/// The shape after a step.
+#[pyclass(frozen, module = "willmore._willmore", name = "State")]
+pub struct PyState(StepState);
+
+#[pymethods]
+impl PyState {
+    #[getter]
+    fn field<'py>(&self, py: Python<'py>) -> PyResult<FieldArray<'py>> {
+        field_array(py, &self.0.field())
+    }
+
+    #[getter]
+    fn shape(&self, py: Python<'_>) -> PyResult<PyShape> {
+        detached(py, || self.0.shape().map(PyShape).map_err(of_job))
+    }
+}

@@ -1,0 +1,63 @@
+//! Learned operators.
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use willmore::jobs::{self, TrainOptions};
+use willmore::model;
+
+use crate::error::{detached, of_job, raised};
+use crate::job::{Options, json, read};
+use crate::watcher::PyWatcher;
+
+/// A learned step of mean curvature flow.
+#[pyclass(frozen, module = "willmore._willmore", name = "NetworkData")]
+pub struct PyNetwork(model::Network);
+
+#[pymethods]
+impl PyNetwork {
+    #[staticmethod]
+    fn load(path: &str) -> PyResult<Self> {
+        model::Network::load(path.as_ref()).map(Self).map_err(|error| raised(&error))
+    }
+
+    fn save(&self, path: &str) -> PyResult<()> {
+        self.0.save(path.as_ref()).map_err(|error| raised(&error))
+    }
+
+    /// Dimension, width of the kernel in cells, interface width in cells, and time step in squared cells, as JSON.
+    #[getter]
+    fn ratios(&self) -> PyResult<String> {
+        json(&self.0.ratios())
+    }
+
+    #[getter]
+    fn calibration(&self) -> PyResult<String> {
+        json(&self.0.calibration().map_err(|error| raised(&error))?)
+    }
+
+    #[getter]
+    fn provenance(&self) -> PyResult<String> {
+        json(&self.0.provenance)
+    }
+
+    /// The values of the kernel in a row.
+    #[getter]
+    fn kernel<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.0.kernel())
+    }
+}
+
+/// Trains a network, and returns it with its loss on spheres that it has not seen.
+#[pyfunction]
+#[pyo3(signature = (options, progress=None))]
+pub fn train(
+    py: Python<'_>,
+    options: Options,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(PyNetwork, f64)> {
+    let options = read::<TrainOptions>(&options)?;
+    let watcher = PyWatcher::new(progress);
+    let trained = detached(py, || jobs::train(options, &watcher).map_err(of_job));
+    let trained = watcher.check(trained)?;
+    Ok((PyNetwork(trained.network), trained.held_out_loss))
+}

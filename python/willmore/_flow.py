@@ -1,0 +1,137 @@
+"""Flows step by step."""
+
+from __future__ import annotations
+
+import json
+from functools import cached_property
+from typing import Any, Iterator
+
+import numpy as np
+
+from . import _results
+from ._inputs import Source
+from ._results import Result
+from ._willmore import State as _State
+from ._willmore import Steps
+
+
+class State:
+    """A shape after a step of a flow, which stays as it is when the flow goes on.
+
+    Attributes
+    ----------
+    step : int
+        The number of the step, from 1; 0 at the beginning.
+    time : float
+        The time, a length to the fourth power.
+    energy : float or None
+        The energy after the step; None at the beginning, where no step has measured it.
+    sizes : dict of float
+        Length and area of a curve, area and volume of a surface, and the reduced volume.
+    record : dict
+        Everything that is known of the step: the rows of ``metrics.csv`` of a run.
+    field : array of float
+        The phase field, 1 inside and -1 outside.
+    spacing, origin
+        The side of a cell of the field, and the position of its first node.
+    mesh
+        The surface, as in `Result`; None for a curve.
+    image : array or None
+        The picture of a curve, as in `Result`.
+    curves : list of (n, 2) arrays
+        The closed curves of a flow in the plane.
+    """
+
+    def __init__(self, state: _State, source: Source, record: dict[str, Any], sizes: dict[str, float]):
+        self._state, self._source = state, source
+        self.record, self.sizes = record, sizes
+        self.step: int = record.get("step", 0)
+        self.time: float = record.get("time", 0.0)
+        self.energy: float | None = record.get("willmore_energy")
+
+    @cached_property
+    def _shape(self) -> Any:
+        return self._state.shape
+
+    @cached_property
+    def _field(self) -> tuple[np.ndarray, float, np.ndarray]:
+        return _results.field_of(self._state)
+
+    @property
+    def field(self) -> np.ndarray:
+        return self._field[0]
+
+    @property
+    def spacing(self) -> float:
+        return self._field[1]
+
+    @property
+    def origin(self) -> np.ndarray:
+        return self._field[2]
+
+    @cached_property
+    def mesh(self) -> Any:
+        return _results.mesh_of(self._shape, self._source)
+
+    @cached_property
+    def image(self) -> np.ndarray | None:
+        return _results.image_of(self._shape, self._source)
+
+    @cached_property
+    def curves(self) -> list[np.ndarray]:
+        from ._shapes import zero_level
+
+        return zero_level(self.field, spacing=self.spacing, origin=self.origin) if self.field.ndim == 2 else []
+
+    def save(self, path: Any) -> None:
+        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg)."""
+        _results.save(self._shape, path)
+
+    def __repr__(self) -> str:
+        energy = "" if self.energy is None else f", energy {self.energy:.6g}"
+        return f"<State: step {self.step}, t = {self.time:.4g}{energy}>"
+
+
+class Flow(Iterator[State]):
+    """A flow that makes a step whenever the next state is asked for.
+
+    A step that was interrupted by Ctrl-C is complete, and the flow can go on: ask for the next state.
+
+    Attributes
+    ----------
+    start : State
+        The shape at the beginning.
+    states : list of State
+        Those that were made.
+    warnings, notes : list of str
+        What you should know before you trust the result, and which choices were made.
+    ended : str or None
+        The rule that ended the flow, once it is over.
+    """
+
+    def __init__(self, steps: Steps, source: Source):
+        self._steps, self._source = steps, source
+        self.warnings: list[str] = steps.warnings
+        self.notes: list[str] = steps.notes
+        self.start = State(steps.state, source, {}, json.loads(steps.start))
+
+    @property
+    def ended(self) -> str | None:
+        return self._steps.ended
+
+    def __next__(self) -> State:
+        while (text := self._steps.step()) is not None:
+            record = json.loads(text)
+            if record["completes_step"]:
+                return State(self._steps.state, self._source, _results.flat(record), record["measures"])
+        raise StopIteration
+
+    def run(self) -> Result:
+        """Makes all steps to the end of the flow, and returns what came out."""
+        for _ in self:
+            pass
+        return self.result()
+
+    def result(self) -> Result:
+        """What has come out so far."""
+        return Result(self._steps.results(), self._source)

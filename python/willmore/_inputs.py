@@ -1,0 +1,178 @@
+"""What a job starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Callable
+
+import numpy as np
+
+from . import _meshes
+from ._willmore import Error, Input
+
+
+@dataclass
+class Source:
+    """An input of the library, and how results become the kind of object that came in."""
+
+    input: Input
+    options: dict[str, Any] = field(default_factory=dict)
+    mesh: _meshes.Kind | None = None
+    image: Callable[[np.ndarray], np.ndarray] | None = None
+
+
+def of_shape(shape: Any, *, spacing: Any = None, origin: Any = None, fixed: Any = None) -> Source:
+    """A mesh, an image, a field, or a name."""
+    name = _meshes.of_path(shape)
+    if name is not None:
+        return Source(Input.named(name))
+    mesh = _meshes.of(shape)
+    if mesh is not None:
+        return Source(_of_mesh(mesh, fixed), mesh=mesh)
+    if hasattr(shape, "dataobj") and hasattr(shape, "affine"):
+        raise Error("this is a volume of voxels: `surfaces` makes smooth surfaces of it")
+    array = np.asarray(shape)
+    if array.dtype == np.bool_ and array.ndim == 2:
+        return _of_mask(array)
+    if array.dtype == np.uint8 and (array.ndim == 2 or array.ndim == 3 and array.shape[2] in (3, 4)):
+        return Source(Input.picture(pixels(array)), image=_as_image(array))
+    if np.issubdtype(array.dtype, np.floating) and array.ndim in (2, 3):
+        return Source(of_field(array, spacing, origin))
+    if array.ndim == 3 and array.dtype != object:
+        raise Error(f"an array of {array.dtype} in three dimensions holds voxels: `surfaces` makes smooth surfaces of them")
+    raise Error(
+        f"{type(shape).__name__} is no shape: give a mesh, (vertices, faces), an image (bool or uint8), a field (float, two or three dimensions), "
+        'or a name such as "scan.ply" or "builtin:torus"'
+    )
+
+
+def _of_mesh(mesh: _meshes.Kind, fixed: Any) -> Input:
+    vertices, faces = _meshes.arrays(mesh.vertices, mesh.faces)
+    if fixed is None:
+        return Input.mesh(vertices, faces)
+    fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
+    if fixed.shape != (len(vertices),):
+        raise Error(f"`fixed` must have one value for each of the {len(vertices)} vertices, not the shape {fixed.shape}")
+    return Input.mesh(vertices, faces, fixed)
+
+
+def of_field(values: Any, spacing: Any, origin: Any) -> Input:
+    """A field on a cubic grid."""
+    values = np.ascontiguousarray(values, dtype=np.float64)
+    if len(set(values.shape)) != 1:
+        raise Error(f"a field has as many cells along each axis, not {' x '.join(map(str, values.shape))}: pad it with -1")
+    spacing = 1.0 if spacing is None else float(spacing)
+    origin = np.broadcast_to(0.0 if origin is None else origin, (values.ndim,)).astype(float).tolist()
+    make = Input.plane if values.ndim == 2 else Input.space
+    return make(values, spacing, origin)
+
+
+def pixels(image: np.ndarray) -> np.ndarray:
+    """Red, green, blue and opacity of an image, or black where a mask is true."""
+    if image.dtype == np.bool_:
+        image = np.where(image, 0, 255).astype(np.uint8)
+    if image.ndim == 2:
+        image = np.repeat(image[:, :, None], 3, axis=2)
+    if image.shape[2] == 3:
+        image = np.concatenate([image, np.full((*image.shape[:2], 1), 255, dtype=np.uint8)], axis=2)
+    return np.ascontiguousarray(image)
+
+
+def _of_mask(mask: np.ndarray) -> Source:
+    def back(picture: np.ndarray) -> np.ndarray:
+        return (picture[:, :, 3] >= 128) & (picture[:, :, 0] < 128)
+
+    return Source(Input.picture(pixels(mask)), options={"inside": "dark"}, image=back)
+
+
+def _as_image(image: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    if image.ndim == 2:
+        return lambda picture: np.ascontiguousarray(picture[:, :, 0])
+    return lambda picture: np.ascontiguousarray(picture[:, :, : image.shape[2]])
+
+
+def of_mask(shape: Any, mask: Any, spacing: Any, origin: Any) -> Input:
+    """The region of an inpainting: a name, or an array of the shape of the image or the field."""
+    name = _meshes.of_path(mask)
+    if name is not None:
+        return Input.named(name)
+    mask = np.asarray(mask)
+    if mask.dtype != np.bool_ or mask.ndim not in (2, 3):
+        raise Error(f"`mask` must be an array of bool, or a region such as 'box:0,0,10,10', not {mask.dtype} of shape {mask.shape}")
+    array = None if _meshes.of_path(shape) is not None or _meshes.of(shape) is not None else np.asarray(shape)
+    if array is not None and np.issubdtype(array.dtype, np.floating):
+        if mask.shape != array.shape:
+            raise Error(f"`mask` has the shape {mask.shape}; it must have that of the field, {array.shape}")
+        return of_field(np.where(mask, -1.0, 1.0), spacing, origin)
+    if mask.ndim == 3:
+        raise Error("`mask` of a shape in space is a region such as 'ball:x,y,z,r', or an array of the shape of a field")
+    ink = np.zeros((*mask.shape, 4), dtype=np.uint8)
+    ink[mask, 3] = 255
+    return Input.picture(ink)
+
+
+@dataclass
+class Voxels:
+    """Values of voxels and where they are."""
+
+    values: np.ndarray
+    affine: np.ndarray
+
+    def input(self) -> Input:
+        flat = self.values.ravel(order="F")
+        return Input.volume(list(self.values.shape), self.affine.tolist(), flat)
+
+
+def of_voxels(labels: Any, *, affine: Any = None, spacing: Any = None, origin: Any = None) -> Voxels:
+    """An array, or the image of nibabel or pyvista."""
+    if hasattr(labels, "dataobj") and hasattr(labels, "affine"):
+        affine = labels.affine if affine is None else affine
+        values = np.asanyarray(labels.dataobj)
+    elif hasattr(labels, "dimensions") and hasattr(labels, "point_data"):
+        values, spacing, origin = _of_grid(labels, spacing, origin)
+    else:
+        values = np.asarray(labels)
+    if values.ndim != 3:
+        raise Error(f"a segmentation has three dimensions, not the shape {values.shape}")
+    return Voxels(_plain(values), _affine(affine, spacing, origin))
+
+
+def _of_grid(grid: Any, spacing: Any, origin: Any) -> tuple[np.ndarray, Any, Any]:
+    dimensions, sides = np.array(grid.dimensions), np.array(grid.spacing, dtype=float)
+    first = np.array(grid.origin, dtype=float)
+    scalars = grid.active_scalars
+    if scalars is None:
+        raise Error("the grid has no active scalars")
+    if grid.active_scalars_info.association.name == "CELL":
+        dimensions, first = dimensions - 1, first + 0.5 * sides
+    values = np.asarray(scalars).reshape(dimensions, order="F")
+    return values, sides if spacing is None else spacing, first if origin is None else origin
+
+
+def _plain(values: np.ndarray) -> np.ndarray:
+    """The values in one of the kinds that the library takes."""
+    if values.dtype in (np.bool_, np.uint8):
+        return values.astype(np.uint8)
+    if np.issubdtype(values.dtype, np.integer):
+        limits = np.iinfo(np.int32)
+        if values.size and (values.min() < limits.min or values.max() > limits.max):
+            raise Error(f"labels must be from {limits.min} to {limits.max}")
+        return values.astype(np.int32)
+    if values.dtype in (np.float16, np.float32):
+        return values.astype(np.float32)
+    if np.issubdtype(values.dtype, np.floating):
+        return values.astype(np.float64)
+    raise Error(f"voxels of {values.dtype} are no labels and no grey values")
+
+
+def _affine(affine: Any, spacing: Any, origin: Any) -> np.ndarray:
+    if affine is not None:
+        if spacing is not None or origin is not None:
+            raise Error("`affine` says where the voxels are: leave out `spacing` and `origin`")
+        affine = np.asarray(affine, dtype=np.float64)
+        if affine.shape not in ((3, 4), (4, 4)):
+            raise Error(f"`affine` must be an array of shape (4, 4), not {affine.shape}")
+        return affine[:3]
+    sides = np.broadcast_to(1.0 if spacing is None else spacing, (3,)).astype(float)
+    first = np.broadcast_to(0.0 if origin is None else origin, (3,)).astype(float)
+    return np.column_stack([np.diag(sides), first])

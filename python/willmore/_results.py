@@ -1,0 +1,188 @@
+"""Results of jobs."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings as python_warnings
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ._inputs import Source
+from ._willmore import Error, Results, Shape
+
+
+class WillmoreWarning(UserWarning):
+    """Something that you should know before you trust a result."""
+
+
+def tell(messages: list[str], stacklevel: int = 4) -> None:
+    """Raises the warnings of a job as those of Python."""
+    for message in messages:
+        python_warnings.warn(message, WillmoreWarning, stacklevel=stacklevel)
+
+
+class Result:
+    """What came out of a job.
+
+    Attributes
+    ----------
+    mesh
+        The surface: a copy of the mesh that came in, of the same kind, with its vertices moved; or a new mesh of that kind. `Arrays` for
+        other inputs, None for curves.
+    image : array or None
+        The picture of a curve, of the shape and type of the image that came in; for a mask, a mask. Red, green, blue and opacity for other inputs.
+    field : array of float
+        The phase field, 1 inside and -1 outside.
+    spacing, origin
+        The side of a cell of the field, and the position of its first node.
+    report : dict
+        Energies, sizes, displacements, and what the grid holds, by the names of the file ``summary.json`` of a run.
+    warnings, notes : list of str
+        What you should know before you trust the result, and which choices were made.
+    metrics : dict of arrays
+        Time, energy, sizes and costs of every step.
+    ended : str
+        The rule that ended the flow.
+    """
+
+    def __init__(self, results: Results, source: Source):
+        self._results, self._source = results, source
+        self.report: dict[str, Any] = json.loads(results.report)
+        self.warnings: list[str] = results.warnings
+        self.notes: list[str] = results.notes
+        self.ended: str | None = results.ended
+
+    @cached_property
+    def _shape(self) -> Shape:
+        return self._results.shape
+
+    @cached_property
+    def mesh(self) -> Any:
+        return mesh_of(self._shape, self._source)
+
+    @cached_property
+    def image(self) -> np.ndarray | None:
+        return image_of(self._shape, self._source)
+
+    @cached_property
+    def _field(self) -> tuple[np.ndarray, float, np.ndarray]:
+        return field_of(self._results)
+
+    @property
+    def field(self) -> np.ndarray:
+        return self._field[0]
+
+    @property
+    def spacing(self) -> float:
+        return self._field[1]
+
+    @property
+    def origin(self) -> np.ndarray:
+        return self._field[2]
+
+    @cached_property
+    def metrics(self) -> dict[str, np.ndarray]:
+        return columns([flat(record) for record in json.loads(self._results.records)])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg).
+
+        Parameters
+        ----------
+        path
+            The file. Its ending says the format. A file that is there is written over.
+
+        Raises
+        ------
+        Error
+            A format that the result does not have, and a shape that has vanished.
+        OSError
+            A file that cannot be written.
+        """
+        save(self._shape, path)
+
+    def to_trimesh(self) -> Any:
+        """The surface as a ``trimesh.Trimesh``."""
+        import trimesh
+
+        vertices, faces = self._triangles()
+        return trimesh.Trimesh(vertices, faces, process=False)
+
+    def to_pyvista(self) -> Any:
+        """The surface as a ``pyvista.PolyData``."""
+        import pyvista
+
+        return pyvista.PolyData.from_regular_faces(*self._triangles())
+
+    def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        mesh = self._shape.mesh
+        if mesh is None:
+            raise Error("there is no surface")
+        return mesh[0], mesh[1].astype(np.int64)
+
+    def __repr__(self) -> str:
+        command, steps = self.report.get("command"), self.report.get("steps")
+        return f"<Result of {command}: {steps} steps, {self.ended}>"
+
+
+def save(shape: Shape, path: str | os.PathLike[str]) -> None:
+    path = os.fspath(path)
+    encoded = shape.encode(os.path.splitext(path)[1].lstrip(".").lower())
+    with open(path, "wb") as file:
+        file.write(encoded)
+
+
+def mesh_of(shape: Shape, source: Source) -> Any:
+    """The surface as the kind of mesh that came in."""
+    from ._meshes import Arrays
+
+    if shape.mesh is None:
+        return None
+    vertices, faces = shape.mesh
+    kind = source.mesh
+    if kind is None:
+        return Arrays(vertices, faces.astype(np.int64))
+    if np.shape(kind.vertices) == vertices.shape and np.array_equal(kind.faces, faces):
+        return kind.moved(vertices)
+    return kind.anew(vertices, faces)
+
+
+def image_of(shape: Shape, source: Source) -> np.ndarray | None:
+    """The picture of a curve as the kind of image that came in."""
+    if shape.picture is None:
+        return None
+    pixels, (width, height) = shape.picture
+    picture = pixels.reshape(height, width, 4)
+    return picture if source.image is None else source.image(picture)
+
+
+def field_of(of: Any) -> tuple[np.ndarray, float, np.ndarray]:
+    """The values of a phase field, its spacing and its origin."""
+    values, cells, spacing, origin = of.field
+    return values.reshape((cells,) * len(origin)), spacing, np.array(origin)
+
+
+def flat(record: dict[str, Any]) -> dict[str, Any]:
+    """A record whose groups are taken apart, but for the estimates of the time steps."""
+    values: dict[str, Any] = {}
+    for name, value in record.items():
+        if isinstance(value, dict):
+            values.update(flat(value))
+        elif not isinstance(value, list):
+            values[name] = value
+    return values
+
+
+def columns(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Rows as arrays by their names. Numbers that a row does not have are NaN."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: _column([row.get(name) for row in rows]) for name in names}
+
+
+def _column(values: list[Any]) -> np.ndarray:
+    if any(value is None for value in values):
+        values = [np.nan if value is None else value for value in values]
+    return np.array(values)
