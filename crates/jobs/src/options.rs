@@ -53,11 +53,11 @@ pub struct InputOptions {
 
     /// Value that separates inside and outside [default: 0.5 for an image]
     ///
-    /// For an image it is a grey value or an opacity from 0 to 1. For a volume it is in the units of the volume, and larger values are inside.
+    /// For an image it is a grey value or an opacity from 0 to 1. For voxels it is in the units of their values, and larger values are inside.
     #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
     pub threshold: Option<f64>,
 
-    /// Label of the voxels that are inside, or all [default: the larger one if there are two]
+    /// Label of the voxels that are inside, or the word all [default: the greater number if there are two labels]
     ///
     /// With all, each label except 0 becomes a surface of its own.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
@@ -106,8 +106,8 @@ pub struct OperatorOptions {
 
     /// Formulation of a time step
     ///
-    /// Calibration corrects the error of the network in the energy: it divides the two terms of the energy by one factor each. The paper is that of
-    /// Rumpf, Sassen and Norden-Smoch.
+    /// Calibration corrects the error of the network in the energy: it divides the motion and the bending energy, the two terms that a
+    /// time step minimizes, by a factor each. The paper is that of Rumpf, Sassen and Norden-Smoch.
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -190,8 +190,8 @@ pub struct RunOptions {
     #[arg(long, value_name = "T", value_parser = positive, help_heading = FLOW)]
     pub time: Option<f64>,
 
-    /// Keep a picture, the field and the shape after every EVERY steps, and make an animation of the pictures
-    #[arg(long, value_name = "EVERY", value_parser = count, help_heading = OUTPUT)]
+    /// Keep a picture, the field and the shape after every N steps, and make an animation of the pictures
+    #[arg(long, value_name = "N", value_parser = count, help_heading = OUTPUT)]
     pub frames: Option<usize>,
 
     /// Steps between two checkpoints
@@ -255,11 +255,12 @@ impl Default for RunOptions {
 pub struct WillmoreOptions {
     /// Rule for the time steps [default: depends on the command]
     ///
-    /// VALUE and FIRST are in (units of length of the input)^4. controlled: steps of second order, whose estimated errors control their sizes. VALUE:
-    /// equal steps. doubling:FIRST: each step is twice the one before. graded:FIRST,PART: each step is PART times the time since the start, and at
-    /// least FIRST. growing:VALUE,COUNT: COUNT steps of size VALUE, then each step is twice the one before. ramp:VALUE,HALVINGS: two steps of size
-    /// VALUE / 2^HALVINGS, then steps double until they have the size VALUE. auto or auto:FIRST: a step that lowers the energy by little is followed
-    /// by one twice as long, and a step that lowers it by much is followed by one half as long.
+    /// VALUE and FIRST are in (units of length of the input)^4. With controlled, steps are of second order, and their estimated errors control their
+    /// sizes. With VALUE, all steps are equal. With doubling:FIRST, each step is twice the one before. With graded:FIRST,PART, each step is PART
+    /// times the time since the start, and at least FIRST. With growing:VALUE,COUNT, COUNT steps have the size VALUE, and then each step is twice
+    /// the one before. With ramp:VALUE,HALVINGS, two steps have the size VALUE / 2^HALVINGS, and then steps double until they have the size VALUE.
+    /// With auto or auto:FIRST, a step that lowers the energy by little is followed by one twice as long, and a step that lowers it by much is
+    /// followed by one half as long.
     ///
     /// The default of `flow` is controlled, and that of `inpaint` is a ramp. The default of `fair` is graded steps, or controlled ones if only
     /// `steps` or `time` ends the run.
@@ -275,8 +276,8 @@ pub struct WillmoreOptions {
 
     /// In 3D, hold or change the volume: keep, a VALUE, or PERCENT such as 90% [default: keep for `fair` of a segmentation]
     ///
-    /// A value is in the units of the input. A percentage is relative to the volume at the beginning. For a segmentation, this is the volume of its
-    /// voxels without specks.
+    /// A value is in the units of the input. A percentage is relative to the volume at the beginning. For a segmentation, the volume at the
+    /// beginning is that of its voxels. Specks do not count: parts and holes of a few voxels, which are left out.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub volume: Option<SizeTarget>,
 
@@ -383,7 +384,7 @@ pub struct FairOptions {
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
     /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. A
-    /// segmentation has no such noise. Unless one of these options says when to stop, it flows for the time (1.6 voxels)^4, or until its surface has
+    /// segmentation has no such noise. If none of these four options is given, its flow stops at the time (1.6 voxels)^4, or earlier if its surface has
     /// moved by 0.35 of a voxel.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
@@ -566,7 +567,7 @@ pub struct TrainOptions {
     #[arg(long, value_name = "RATIO")]
     pub eps_over_h: Option<f64>,
 
-    /// Time step of mean curvature flow in cells squared [default: `eps_over_h`^2 / 4, as the other commands need it]
+    /// Time step of mean curvature flow in cells squared [default: `eps_over_h`^2 / 4; flows accept no other value]
     #[arg(long, value_name = "RATIO")]
     pub step_over_h2: Option<f64>,
 
