@@ -17,7 +17,7 @@ const LOST: Rgb = OKABE_ITO[1];
 /// What became of a surface.
 pub struct Faired {
     pub surface: Surface,
-    pub displacement: Figure,
+    pub displacement: Displacement,
     pub report: MeshReport,
 }
 
@@ -27,10 +27,14 @@ impl Faired {
         let distance = MeshDistance::new(before);
         let lengths = distance.signed_distances(&mesh.vertices).into_iter();
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
-        let none_lost = vec![false; lengths.len()];
         Ok(Self {
-            displacement: figure(&mesh, &lengths, &none_lost, up)?,
             report: MeshReport::new(before, &mesh, &lengths),
+            displacement: Displacement {
+                lost: vec![false; lengths.len()],
+                mesh: mesh.clone(),
+                lengths,
+                up,
+            },
             surface: Surface {
                 mesh,
                 up,
@@ -109,48 +113,71 @@ impl MeshReport {
     }
 }
 
-/// The surface in the colours of the lengths by which its vertices have moved, and their histogram, whose bars say which colour is which
-/// length. Vertices that are `lost`, at parts or gaps that the grid does not hold, have a colour of their own.
-pub fn figure(mesh: &TriangleMesh, lengths: &[f64], lost: &[bool], up: UpAxis) -> Result<Figure> {
-    // Also where all of them are zero there is a range of lengths.
-    let largest = lengths.iter().copied().fold(1e-100, f64::max);
-    let colours = lengths.iter().zip(lost);
-    let colours = colours.map(|(length, lost)| {
-        if *lost {
-            LOST
-        } else {
-            viridis(length / largest)
-        }
-    });
-    let scene = Scene::of_mesh(mesh.clone()).view(View::from_front_left(up));
-    let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
-    let count = lost.iter().filter(|lost| **lost).count();
-    let percent = 100.0 / lengths.len().max(1) as f64;
-    let caption = match count {
-        0 => String::new(),
-        _ => format!(
-            "orange: {:.1} % of the vertices, at parts or gaps that the grid does not hold",
-            percent * count as f64
-        ),
-    };
-    let size = picture.size().map(|side| side as usize);
-    let surface = Raster::new(caption, size, picture.pixels());
-    let mut shares = [0.0; BARS];
-    for length in lengths {
-        let bar = (length / largest * BARS as f64) as usize;
-        shares[bar.min(BARS - 1)] += percent;
+/// How far the vertices of a surface have moved.
+pub struct Displacement {
+    pub mesh: TriangleMesh,
+    /// For each vertex.
+    pub lengths: Vec<f64>,
+    /// Whether a vertex is at a part or gap that the grid does not hold.
+    pub lost: Vec<bool>,
+    pub up: UpAxis,
+}
+
+impl Displacement {
+    /// The surface in the colours of the lengths, and their histogram, whose bars say which colour is which length. Vertices that are lost have a
+    /// colour of their own.
+    pub fn figure(&self) -> Result<Figure> {
+        // Also where all of them are zero there is a range of lengths.
+        let largest = self.lengths.iter().copied().fold(1e-100, f64::max);
+        Ok(Figure::new("", 2)
+            .with_panel(self.painted(largest)?)
+            .with_panel(self.histogram(largest)))
     }
-    let bars = shares.iter().enumerate().map(|(bar, share)| {
-        let middle = (bar as f64 + 0.5) / BARS as f64;
-        let bar = Series::new("", [[middle * largest, 0.0], [middle * largest, *share]]);
-        bar.with_colour(viridis(middle)).with_width(WIDTH)
-    });
-    let chart = LineChart::new(
-        "How far it has gone at its vertices",
-        Axis::linear("length, in the units of the mesh").with_range(0.0, largest),
-        Axis::linear("vertices, %"),
-    );
-    Ok(Figure::new("", 2)
-        .with_panel(surface)
-        .with_panel(chart.with_curves(bars)))
+
+    fn painted(&self, largest: f64) -> Result<Raster> {
+        let colours = self.lengths.iter().zip(&self.lost);
+        let colours = colours.map(|(length, lost)| {
+            if *lost {
+                LOST
+            } else {
+                viridis(length / largest)
+            }
+        });
+        let scene = Scene::of_mesh(self.mesh.clone()).view(View::from_front_left(self.up));
+        let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
+        let count = self.lost.iter().filter(|lost| **lost).count();
+        let caption = match count {
+            0 => String::new(),
+            _ => format!(
+                "orange: {:.1} % of the vertices, at parts or gaps that the grid does not hold",
+                self.percent() * count as f64
+            ),
+        };
+        let size = picture.size().map(|side| side as usize);
+        Ok(Raster::new(caption, size, picture.pixels()))
+    }
+
+    fn histogram(&self, largest: f64) -> LineChart {
+        let mut shares = [0.0; BARS];
+        for length in &self.lengths {
+            let bar = (length / largest * BARS as f64) as usize;
+            shares[bar.min(BARS - 1)] += self.percent();
+        }
+        let bars = shares.iter().enumerate().map(|(bar, share)| {
+            let middle = (bar as f64 + 0.5) / BARS as f64;
+            let bar = Series::new("", [[middle * largest, 0.0], [middle * largest, *share]]);
+            bar.with_colour(viridis(middle)).with_width(WIDTH)
+        });
+        LineChart::new(
+            "How far it has gone at its vertices",
+            Axis::linear("length, in the units of the mesh").with_range(0.0, largest),
+            Axis::linear("vertices, %"),
+        )
+        .with_curves(bars)
+    }
+
+    /// The share of one vertex.
+    fn percent(&self) -> f64 {
+        100.0 / self.lengths.len().max(1) as f64
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use engine::DISPLACEMENT;
 use surfaces::Followed;
 
-use crate::faired::{Faired, MeshReport, figure, surface};
+use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
 use crate::made::{MeshFile, Surface};
 use crate::paths::extension;
@@ -244,7 +244,12 @@ impl OwnMesh {
             ..MeshReport::new(rough, &moved, &lengths)
         };
         Ok(Faired {
-            displacement: figure(&moved, &lengths, &lost, up)?,
+            displacement: Displacement {
+                mesh: moved,
+                lengths,
+                lost,
+                up,
+            },
             surface: Surface {
                 file: Some(MeshFile {
                     format: self.extension().to_owned(),

@@ -248,7 +248,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             let picture = self.presentation.picture(start, u, eps)?.to_png()?;
             directory.write_file(&format!("{stem}.png"), &picture)?;
             if let Some(faired) = faired {
-                let figure = faired.displacement.to_svg()?;
+                let figure = faired.displacement.figure()?.to_svg()?;
                 directory.write_file(presentation::DISPLACEMENT, figure.as_bytes())?;
             }
             self.write_shape(u, eps, faired, stem, directory)?;
