@@ -40,8 +40,8 @@
 //! accepts the candidate, or asks for another one. Your own terms, schemes, controllers and stop rules go into [`Own`], an operator into
 //! [`Operator::own`], a measure into [`Measure::new`]. An [`Observer`] sees the run.
 //!
-//! Errors of the crates below, such as [`Error::Runs`] and [`Error::Geometry`], pass through unchanged. A function that refuses an input itself
-//! says so in its documentation.
+//! Errors of the crates that this crate depends on, such as [`Error::Runs`] and [`Error::Geometry`], pass through unchanged. If a function can
+//! also refuse an input on its own, its documentation says so.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -1,8 +1,8 @@
 //! Finite-element steps of mean curvature flow, for comparison with the learned operator.
 //!
 //! The nested scheme of Franken, Rumpf and Wirth puts a finite-element step of mean curvature flow into the
-//! minimizing-movement energy. [`FiniteElementStep`] is the inner step, fully implicit or semi-implicit. `solver::Euler` makes the time steps,
-//! with the Newton method that the learned operator also uses:
+//! minimizing-movement energy. [`FiniteElementStep`] is the inner step, fully implicit or semi-implicit. `solver::Euler` makes the time steps.
+//! It minimizes the energy of a time step by the same Newton method as with the learned operator:
 //!
 //! ```
 //! use fem::FiniteElementStep;

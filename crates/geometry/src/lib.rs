@@ -45,7 +45,7 @@
 //!   limit of small $`\varepsilon`$.
 //! - The $`L^2`$ norm is $`(h^D \sum u^2)^{1/2}`$, an integral and not a mean.
 //! - Mean curvature is the sum of the principal curvatures. [`exact`] has flows and energies.
-//! - Items are generic over the dimension `D`, unless they exist in one dimension only.
+//! - Items are generic over the dimension `D`, unless they make sense only in the plane or only in space.
 //! - The same input gives the same bytes: parallel sums have a fixed order.
 
 mod bricks;

@@ -53,7 +53,8 @@
 //! - Everything with a signed distance can be drawn: outlines, the interface of a field, the shapes
 //!   of [`geometry`] and their combinations.
 //! - The same input gives the same bytes, for any number of threads.
-//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
+//! - Errors of the crates that this crate depends on pass through unchanged. If a function can also refuse an input on its own, its documentation
+//!   says so.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -19,7 +19,8 @@
 //!
 //! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a run
 //! in a folder, with pictures and a page, and [`resume`] continues it. [`open`] turns an input into a phase field on a suitable grid.
-//! [`check`] tests derivatives on an input, and [`train`] trains networks for other ratios.
+//! [`check`] tests derivatives on an input. [`train`] trains networks for other widths of the interface and other sizes of
+//! the inner step, relative to the spacing of the grid.
 //!
 //! Nothing is printed. A job tells a [`Watcher`] its [warnings](Warning), its [notes](Note) and its progress. Warnings and notes are typed
 //! values that contain the numbers. The watcher can also interrupt the job. Messages write the names of options in backticks, such as `cells`. A

@@ -3,7 +3,8 @@
 //! Write a scalar function of tensors once, in ordinary Burn. This crate traces it together with its
 //! reverse-mode gradient, differentiates the recorded graph again in forward mode, and replays the
 //! result on a backend: `hvp = linearize(grad(E))`, forward over reverse. Values that depend on the
-//! point alone are computed once per point. A short linear program remains for each direction.
+//! point alone are computed once per point. For each direction, only a short sequence of linear
+//! operations remains.
 //!
 //! ```
 //! use burn::tensor::{DType, Device, Tensor, TensorData};
@@ -41,7 +42,7 @@
 //! let product = linearization.apply(&[tensor([1.0, 0.0, 0.0, 0.0]).into()])?;
 //! assert_eq!(product[0].to_vec(), [5.0, -0.5, 0.0, -0.5]);
 //!
-//! // The double well, however it is written, costs one product per direction.
+//! // However the double well is written, it costs one elementwise multiplication per direction.
 //! assert_eq!(program.statistics().tangent["Mul"], 1);
 //! # Ok(())
 //! # }
@@ -70,7 +71,7 @@
 //!
 //! [`Graph::linearize`] shares common subexpressions, removes products with ones and sums with zeros,
 //! and keeps a constant as one number instead of a grid of equal numbers. As long as operations are
-//! elementwise, the tangent of a value is kept as a sum of products, each of a coefficient and the
+//! elementwise, the tangent of a value is kept as a sum. Each summand is a coefficient times the
 //! tangent of an earlier value. So pointwise second derivatives merge into one coefficient, which is
 //! computed once per point. [`Program::statistics`] counts the remaining operations. If asked to,
 //! [`Graph::linearize`] runs the products in another precision than values and gradients.

@@ -9,7 +9,8 @@
 //!
 //! with the size $`\tilde\tau`$ of the step, the width $`\varepsilon`$ of the interface, and a factor $`c`$ near 1. (It is 1 for an exact step
 //! with a symmetric derivative.) [`calibration`] explains this factor. A step may implement nothing but $`v[u]`$. Then [`measured`] computes
-//! $`c`$, and the inverse of the Hessian in the pure phases for the preconditioner of the solver.
+//! $`c`$. For the preconditioner of the solver, it also computes the inverse of a Hessian: that of the energy of a time step in the pure phases,
+//! where $`u`$ is constant.
 
 pub mod calibration;
 mod error;

@@ -38,7 +38,7 @@
 //! about half a minute. The smallest spheres dominate this loss, so losses for different radii cannot be compared. [`Quality`] measures the loss
 //! on two fixed sets of radii. For Willmore flow a small loss is not enough: see [`mean_curvature::calibration`].
 //!
-//! Errors of the device and of the crates below pass through unchanged.
+//! Errors of the device and of the crates that this crate depends on pass through unchanged.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

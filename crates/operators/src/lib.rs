@@ -24,7 +24,8 @@
 //! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` on active bricks, along one axis `e` | its transpose |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | the same operation with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
-//! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`], [`update_on_host`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y`, work on the host | none (iterative solvers) |
+//! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y` | none (iterative solvers) |
+//! | [`update_on_host`] | a vector changed by a computation on the host | none (iterative solvers) |
 //! | [`retract`], [`extrapolate`] | motions in the variable `atanh u` | none (line searches) |
 //!
 //! # Conventions

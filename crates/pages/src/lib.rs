@@ -34,15 +34,17 @@
 //! # Conventions
 //!
 //! - A page works from a disk, from a server and from a mail. It asks the network for nothing.
-//! - Text is shown as text and never read as markup. Only [`markdown`] and the cells of tables in
-//!   Markdown are read as markup. They cannot bring in scripts or pictures.
+//! - Text is shown as it is, and not read as markup. There are two exceptions: the text that is given to
+//!   [`markdown`], and the cells of a table that is read from Markdown. They cannot bring in scripts or
+//!   pictures.
 //! - Without JavaScript, sequences are strips and surfaces are pictures. Everything can be reached by
 //!   keyboard, and every picture has a text for readers who cannot see it.
 //! - Pictures have a white background, also on a dark page: figures are drawn for paper.
 //! - The same input gives the same bytes.
 //! - A page that is opened as `page.html#check` starts its viewers, and checks its pictures and links. It lists
 //!   failures in the attribute `data-check` of its root element. `scripts/check_pages` reads this attribute.
-//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
+//! - Errors of the crates that this crate depends on pass through unchanged. If a function can also refuse an input on its own, its documentation
+//!   says so.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

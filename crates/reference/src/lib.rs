@@ -1,7 +1,8 @@
 //! Exact flows and equilibria of curves and of surfaces of revolution, as references for other methods. They do not use phase fields.
 //!
 //! - [`planar`]: Willmore flow and curve shortening of plane curves, also of polygons, to about 1e-8 of their size.
-//! - [`revolution`]: Willmore and mean curvature flow of spheres, disks, tori and other surfaces of revolution, to about 1e-6.
+//! - [`revolution`]: Willmore and mean curvature flow of spheres, thick disks, tori and other closed surfaces of revolution, to about 1e-6
+//!   of their size.
 //! - [`equilibria`]: axisymmetric vesicles of given area and volume, and closed elastic curves of given length and area.
 //!
 //! Curves are counterclockwise, and the curvature `kappa` of a circle is positive. On surfaces `kappa` is the sum of the principal

@@ -47,7 +47,8 @@
 //! - Light is computed and blended linearly. Given colours and returned pixels are sRGB.
 //! - The same input gives the same bytes, for any number of threads.
 //! - Angles are in degrees, lengths in the units of the surface, sizes of pictures in pixels.
-//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
+//! - Errors of the crates that this crate depends on pass through unchanged. If a function can also refuse an input on its own, its documentation
+//!   says so.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

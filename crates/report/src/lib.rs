@@ -37,9 +37,9 @@
 //! - Sizes are in layout units: one CSS pixel in SVG, two pixels in PNG. By default figures are 800
 //!   units wide, and are to be read at this width.
 //! - Colours come from the palette of Okabe and Ito ([`OKABE_ITO`]) and from viridis, both safe for the colour-blind.
-//! - Text is set in the embedded `DejaVu Sans` 2.37 (from the `dejavu` crate; Bitstream Vera
-//!   licence, changes in the public domain) in PNG, and in a sans-serif family in SVG. No system
-//!   font is used.
+//! - In PNG, text is set in the embedded `DejaVu Sans` 2.37, and in SVG in a sans-serif family. No system
+//!   font is used. (`DejaVu Sans` is from the `dejavu` crate. It has the licence of Bitstream Vera, and
+//!   what DejaVu changed in that font is in the public domain.)
 //! - A value that cannot be shown (NaN, or zero on a logarithmic axis) is left out of pictures, and its
 //!   curve is interrupted there. [`Summary`] and [`Table`] refuse such a value.
 //! - The same input gives the same bytes, except for manifests.

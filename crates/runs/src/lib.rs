@@ -45,9 +45,9 @@
 //!
 //! # What is promised
 //!
-//! - A checkpoint is the commit. All files that it lists are written and flushed before the checkpoint itself. So the last checkpoint describes
-//!   a whole state of the run, whenever the process dies. If the last checkpoint does not list a file, this file was written later. A resumed
-//!   run writes it again.
+//! - To commit is to write a checkpoint. All files that a checkpoint lists are written and flushed before the checkpoint itself. So the last
+//!   checkpoint describes a whole state of the run, whenever the process dies. If the last checkpoint does not list a file, this file was
+//!   written later. A resumed run writes it again.
 //! - Let a run be a function of its [`CheckpointState`]. Then every file that is written once has the same bytes at the end of the run, however
 //!   often the run was stopped. At the end only the last checkpoint stays.
 //! - If a bit has flipped in a file that is written once, opening the run finds it, and the error names the file.

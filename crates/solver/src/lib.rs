@@ -43,10 +43,10 @@
 //!
 //! # Conventions
 //!
-//! [`geometry`] defines grids, norms and signs. Energies in [`StepRecord`] are in the units of the formula above, in which norms are integrals.
-//! Energies and gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32` the energy of a step has about seven digits. So a
-//! minimization can end with [`Exit::Precision`] before it reaches a tight tolerance. Errors of the device and of the crates below pass through
-//! unchanged.
+//! [`geometry`] defines grids, norms and signs. Energies in [`StepRecord`] have the units of the formula above: squares are
+//! integrated over the box, not summed over the nodes. Energies and gradients have the precision of the device, `f64` on CPUs. On a GPU in `f32`
+//! the energy of a step has about seven digits. So a minimization can end with [`Exit::Precision`] before it reaches a tight tolerance. Errors
+//! of the device and of the crates that this crate depends on pass through unchanged.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

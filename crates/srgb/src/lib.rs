@@ -1,4 +1,4 @@
-//! Colours: sRGB outside, linear inside.
+//! Colours: sRGB in files and on screens, linear intensities in computations.
 //!
 //! Light is added and averaged in linear intensities; files and screens take sRGB values
 //! (IEC 61966-2-1).

@@ -44,7 +44,8 @@
 //!   the units of the file. Surfaces are in these coordinates.
 //! - Faces are counter-clockwise seen from outside, also where the axes of the voxels are left-handed.
 //! - The same input gives the same bytes, for any number of threads.
-//! - Errors of the crates below pass through unchanged. A function that refuses an input itself says so in its documentation.
+//! - Errors of the crates that this crate depends on pass through unchanged. If a function can also refuse an input on its own, its documentation
+//!   says so.
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 

@@ -24,10 +24,10 @@
 //! ```
 //!
 //! [`Willmore`] has defaults for most flows. Each time step measures curvature by a short step of mean curvature flow, the inner step. By
-//! default this is a learned operator with a network of the accurate recipe, the most accurate one, and it is calibrated: two factors correct
-//! its error (`docs/calibration.md`). The grid is divided into blocks, the bricks. If the bricks near the surface are less than half of the
-//! grid, only they are stored. Time steps are of second order, and their estimated errors limit their sizes. The methods of [`Willmore`] change
-//! these defaults.
+//! default this is a learned operator. Its network is trained by the accurate recipe, the most accurate of the recipes. The time step is
+//! calibrated: two factors of its energy correct an error of the operator (`docs/calibration.md`). The grid is divided into blocks, the bricks.
+//! If the bricks near the surface are less than half of the grid, only they are stored. Time steps are of second order, and their estimated
+//! errors limit their sizes. The methods of [`Willmore`] change these defaults.
 //!
 //! # Meshes, segmentations, drawings
 //!
