@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use willmore::jobs::Progress;
 use willmore::prelude::{FlowOptions, Interrupt, Job, Watcher, run_in_folder};
 
 use crate::common::{files, outcome, run, text};
@@ -65,9 +66,24 @@ fn a_run_in_space_has_a_page_with_a_surface_to_turn() {
 /// What there is of a run that was interrupted is shown.
 #[test]
 fn a_run_that_is_not_finished_shows_its_surface() {
+    #[derive(Clone)]
     struct Impatient(Interrupt);
 
+    impl Progress for Impatient {
+        fn reach(&self, steps: u64) {
+            if steps > 0 {
+                self.0.request();
+            }
+        }
+
+        fn advance(&self) {}
+    }
+
     impl Watcher for Impatient {
+        fn begins(&self, _: &str, _: u64) -> Box<dyn Progress> {
+            Box::new(self.clone())
+        }
+
         fn interrupt(&self) -> Result<Interrupt, willmore::runs::Error> {
             Ok(self.0.clone())
         }
@@ -79,7 +95,6 @@ fn a_run_that_is_not_finished_shows_its_surface() {
     (options.run.steps, options.run.frames) = (Some(3), Some(1));
     options.run.output = Some(folder.path().join("run"));
     let watcher = Impatient(Interrupt::never());
-    watcher.0.request();
     let outcome = run_in_folder(Job::Flow(options), &watcher).unwrap();
     assert!(outcome.summary.is_none() && outcome.steps == 1);
     let html = page(folder.path(), "run");

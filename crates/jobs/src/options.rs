@@ -57,7 +57,7 @@ pub struct InputOptions {
     #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
     pub threshold: Option<f64>,
 
-    /// Label of the voxels that are inside, or the word all [default: the greater number if there are two labels]
+    /// Label of the voxels that are inside, or the word all [default: if there are two labels, the one with the greater value]
     ///
     /// With all, each label except 0 becomes a surface of its own.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
@@ -106,8 +106,8 @@ pub struct OperatorOptions {
 
     /// Formulation of a time step
     ///
-    /// Calibration corrects the error of the network in the energy: it divides the motion and the bending energy, the two terms that a
-    /// time step minimizes, by a factor each. The paper is that of Rumpf, Sassen and Norden-Smoch.
+    /// The values speak of calibration and of a paper. Calibration corrects the error of the network in the energy: it divides the motion and the
+    /// bending energy, the two terms that a time step minimizes, by a factor each. The paper is that of Rumpf, Sassen and Norden-Smoch.
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -182,7 +182,7 @@ impl Default for CommonOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// Stop after this many steps [default: 20, or 1000 if something else ends the run]
+    /// Make at most this many steps [default: 20, or 1000 if another option says when to stop]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
     pub steps: Option<usize>,
 
@@ -255,12 +255,14 @@ impl Default for RunOptions {
 pub struct WillmoreOptions {
     /// Rule for the time steps [default: depends on the command]
     ///
-    /// VALUE and FIRST are in (units of length of the input)^4. With controlled, steps are of second order, and their estimated errors control their
-    /// sizes. With VALUE, all steps are equal. With doubling:FIRST, each step is twice the one before. With graded:FIRST,PART, each step is PART
-    /// times the time since the start, and at least FIRST. With growing:VALUE,COUNT, COUNT steps have the size VALUE, and then each step is twice
-    /// the one before. With ramp:VALUE,HALVINGS, two steps have the size VALUE / 2^HALVINGS, and then steps double until they have the size VALUE.
-    /// With auto or auto:FIRST, a step that lowers the energy by little is followed by one twice as long, and a step that lowers it by much is
-    /// followed by one half as long.
+    /// VALUE and FIRST are in (units of length of the input)^4. The rule is one of these:
+    /// "controlled" makes steps of second order, whose estimated errors control their sizes;
+    /// "VALUE" makes equal steps;
+    /// "doubling:FIRST" makes each step twice as long as the one before;
+    /// "graded:FIRST,PART" makes each step PART times the time since the start, and at least FIRST;
+    /// "growing:VALUE,COUNT" makes COUNT steps of the size VALUE, and then each step twice as long as the one before;
+    /// "ramp:VALUE,HALVINGS" makes two steps of the size VALUE / 2^HALVINGS, and then steps that double until they have the size VALUE;
+    /// "auto" or "auto:FIRST" doubles a step after one that lowers the energy by little, and halves it after one that lowers it by much.
     ///
     /// The default of `flow` is controlled, and that of `inpaint` is a ramp. The default of `fair` is graded steps, or controlled ones if only
     /// `steps` or `time` ends the run.
@@ -283,7 +285,7 @@ pub struct WillmoreOptions {
 
     /// In 2D, hold or change the length of the curve: keep, a VALUE, or PERCENT such as 105%
     ///
-    /// `flow` first rounds edges whose radius is smaller than the interface is wide. This changes the length. Then the length goes to its target in
+    /// `flow` first rounds corners whose radius is smaller than the interface is wide. This changes the length. Then the length goes to its target in
     /// `ramp` steps.
     #[arg(long, value_name = "TARGET", help_heading = SIZES, hide_short_help = true)]
     pub length: Option<SizeTarget>,
@@ -383,15 +385,15 @@ pub struct FairOptions {
 
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
-    /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. A
-    /// segmentation has no such noise. If none of these four options is given, its flow stops at the time (1.6 voxels)^4, or earlier if its surface has
-    /// moved by 0.35 of a voxel.
+    /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. For
+    /// a segmentation, `noise` is refused: unless one of these four options says when to stop, the flow of a segmentation stops at the time
+    /// (1.6 voxels)^4, or earlier if its surface has moved by 0.35 of a voxel.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
 
     /// Stop as soon as the Willmore energy is no more than PART of the energy at the beginning
     ///
-    /// The volume changes, unless `volume` keep holds it.
+    /// The volume changes, unless it is held by the option `volume` with the value keep.
     #[arg(long, value_name = "PART", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub energy_ratio: Option<f64>,
 
