@@ -1,6 +1,6 @@
 //! Exact references.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayMethods};
 use pyo3::prelude::*;
 use reference::equilibria::{self, Branch};
 use reference::{Accuracy, Curve, Flow, Shape, planar, revolution};
@@ -57,19 +57,28 @@ impl PyExactShape {
     }
 
     #[staticmethod]
-    fn polygon(points: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
-        Self::new(Shape::polygon(rows(&points)))
+    fn polygon(points: Points<'_>) -> PyResult<Self> {
+        Self::new(Shape::polygon(rows(&points)?))
     }
 
     #[staticmethod]
-    fn smooth(points: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
-        Self::new(Shape::smooth(&rows(&points)))
+    fn smooth(points: Points<'_>) -> PyResult<Self> {
+        Self::new(Shape::smooth(&rows(&points)?))
     }
 }
 
-fn rows(points: &PyReadonlyArray2<'_, f64>) -> Vec<[f64; 2]> {
-    let rows = points.as_array();
-    rows.rows().into_iter().map(|x| [x[0], x[1]]).collect()
+/// An array of numbers, or what numpy makes one of.
+type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
+fn rows(points: &Points<'_>) -> PyResult<Vec<[f64; 2]>> {
+    let points = points.as_array();
+    if points.ncols() != 2 {
+        return Err(Error::new_err(format!(
+            "points must be an array of shape (n, 2), not {:?}",
+            points.dim()
+        )));
+    }
+    Ok(points.rows().into_iter().map(|x| [x[0], x[1]]).collect())
 }
 
 fn points<'py>(py: Python<'py>, curve: &Curve) -> PyResult<Bound<'py, PyArray2<f64>>> {

@@ -160,12 +160,9 @@ pub fn zero_surface<'py>(
     origin: [f64; 3],
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>)> {
     let cells = values.as_array().dim().0;
-    let field = field(
-        cells,
-        spacing,
-        origin,
-        values.as_array().iter().copied().collect(),
-    )?;
+    // A surface is where distances are zero, which are negative inside.
+    let distances = values.as_array().iter().map(|u| -u).collect();
+    let field = field(cells, spacing, origin, distances)?;
     let mesh = detached(py, || {
         surfaces::isosurface(&field).map_err(|error| raised(&error))
     })?;
