@@ -29,7 +29,7 @@ class State:
     sizes : dict of float
         Length and area of a curve, area and volume of a surface, and the reduced volume.
     record : dict
-        Everything that is known of the step: the rows of ``metrics.csv`` of a run.
+        Everything that is known of the step: its row in ``metrics.csv`` of a run, and more.
     field : array of float
         The phase field, 1 inside and -1 outside.
     spacing, origin
@@ -84,7 +84,7 @@ class State:
         return zero_level(self.field, spacing=self.spacing, origin=self.origin) if self.field.ndim == 2 else []
 
     def save(self, path: Any) -> None:
-        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg)."""
+        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg), as `Result.save`."""
         _results.save(self._shape, path)
 
     def __repr__(self) -> str:
@@ -101,8 +101,6 @@ class Flow(Iterator[State]):
     ----------
     start : State
         The shape at the beginning.
-    states : list of State
-        Those that were made.
     warnings, notes : list of str
         What you should know before you trust the result, and which choices were made.
     ended : str or None
@@ -123,7 +121,7 @@ class Flow(Iterator[State]):
         while (text := self._steps.step()) is not None:
             record = json.loads(text)
             if record["completes_step"]:
-                return State(self._steps.state, self._source, _results.flat(record), record["measures"])
+                return State(self._steps.state, self._source, _results.row(record), record["measures"])
         raise StopIteration
 
     def run(self) -> Result:
@@ -135,3 +133,6 @@ class Flow(Iterator[State]):
     def result(self) -> Result:
         """What has come out so far."""
         return Result(self._steps.results(), self._source)
+
+    def __repr__(self) -> str:
+        return f"<Flow: {self.ended or 'goes on'}>"

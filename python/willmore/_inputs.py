@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Callable
 
 import numpy as np
@@ -13,29 +13,33 @@ from ._willmore import Error, Input
 
 @dataclass
 class Source:
-    """An input of the library, and how results become the kind of object that came in."""
+    """An input of the library, and how results become the kind of object that came in; of an image its own red, green, blue and opacity."""
 
     input: Input
     options: dict[str, Any] = field(default_factory=dict)
     mesh: _meshes.Kind | None = None
     image: Callable[[np.ndarray], np.ndarray] | None = None
+    pixels: np.ndarray | None = None
 
 
 def of_shape(shape: Any, *, spacing: Any = None, origin: Any = None, fixed: Any = None) -> Source:
     """A mesh, an image, a field, or a name."""
     name = _meshes.of_path(shape)
     if name is not None:
+        if fixed is not None:
+            raise Error("`fixed` of a mesh that has a name must be a region: for an array, read the mesh first")
         return Source(Input.named(name))
     mesh = _meshes.of(shape)
     if mesh is not None:
         return Source(_of_mesh(mesh, fixed), mesh=mesh)
     if hasattr(shape, "dataobj") and hasattr(shape, "affine"):
         raise Error("this is a volume of voxels: `surfaces` makes smooth surfaces of it")
-    array = np.asarray(shape)
+    array = _meshes.array("shape", shape)
     if array.dtype == np.bool_ and array.ndim == 2:
         return _of_mask(array)
     if array.dtype == np.uint8 and (array.ndim == 2 or array.ndim == 3 and array.shape[2] in (3, 4)):
-        return Source(Input.picture(pixels(array)), image=_as_image(array))
+        own = pixels(array)
+        return Source(Input.picture(own), image=_as_image(array), pixels=own)
     if np.issubdtype(array.dtype, np.floating) and array.ndim in (2, 3):
         return Source(of_field(array, spacing, origin))
     if array.ndim == 3 and array.dtype != object:
@@ -50,6 +54,9 @@ def _of_mesh(mesh: _meshes.Kind, fixed: Any) -> Input:
     vertices, faces = _meshes.arrays(mesh.vertices, mesh.faces)
     if fixed is None:
         return Input.mesh(vertices, faces)
+    fixed = _meshes.array("fixed", fixed)
+    if fixed.dtype.kind not in "biu":
+        raise Error(f"`fixed` must be an array of bool, not of {fixed.dtype}")
     fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
     if fixed.shape != (len(vertices),):
         raise Error(f"`fixed` must have one value for each of the {len(vertices)} vertices, not the shape {fixed.shape}")
@@ -61,10 +68,18 @@ def of_field(values: Any, spacing: Any, origin: Any) -> Input:
     values = np.ascontiguousarray(values, dtype=np.float64)
     if len(set(values.shape)) != 1:
         raise Error(f"a field has as many cells along each axis, not {' x '.join(map(str, values.shape))}: pad it with -1")
-    spacing = 1.0 if spacing is None else float(spacing)
-    origin = np.broadcast_to(0.0 if origin is None else origin, (values.ndim,)).astype(float).tolist()
+    side = 1.0 if spacing is None else numbers("spacing", spacing, 1)[0]
+    first = numbers("origin", 0.0 if origin is None else origin, values.ndim)
     make = Input.plane if values.ndim == 2 else Input.space
-    return make(values, spacing, origin)
+    return make(values, side, first)
+
+
+def numbers(name: str, given: Any, count: int) -> list[float]:
+    """So many numbers, or one in place of all of them."""
+    values = _meshes.reals(name, given)
+    if values.size not in (1, count):
+        raise Error(f"`{name}` must be a number{f' or {count} numbers' if count > 1 else ''}, not an array of shape {values.shape}")
+    return [float(value) for value in np.broadcast_to(values.ravel(), (count,))]
 
 
 def pixels(image: np.ndarray) -> np.ndarray:
@@ -91,14 +106,41 @@ def _as_image(image: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     return lambda picture: np.ascontiguousarray(picture[:, :, : image.shape[2]])
 
 
+def coloured(source: Source, drawing: np.ndarray) -> Source:
+    """With pictures in the colours that the image has inside and outside of its shape, which is where the drawing is black."""
+    back, own = source.image, source.pixels
+    if back is None or own is None:
+        return source
+    ink, paper = (_usual(own[drawing[:, :, 0] == tone], tone) for tone in (0, 255))
+
+    def paint(picture: np.ndarray) -> np.ndarray:
+        part = 1.0 - picture[:, :, :1] / 255.0
+        mixed: np.ndarray = part * ink + (1.0 - part) * paper
+        mixed[:, :, :3] /= mixed[:, :, 3:]
+        return mixed.round().astype(np.uint8)
+
+    return replace(source, image=lambda picture: back(paint(picture)))
+
+
+def _usual(pixels: np.ndarray, tone: int) -> np.ndarray:
+    """The usual colour of pixels, or black or white; red, green and blue times the opacity, so that it can be mixed."""
+    colour = np.median(pixels, axis=0) if len(pixels) else np.array([tone, tone, tone, 255.0])
+    opacity = max(colour[3], 1e-6)
+    return np.array([*(colour[:3] * opacity), opacity])
+
+
 def of_mask(shape: Any, mask: Any, spacing: Any, origin: Any) -> Input:
     """The region of an inpainting: a name, or an array of the shape of the image or the field."""
     name = _meshes.of_path(mask)
     if name is not None:
         return Input.named(name)
-    mask = np.asarray(mask)
+    mask = _meshes.array("mask", mask)
     if mask.dtype != np.bool_ or mask.ndim not in (2, 3):
         raise Error(f"`mask` must be an array of bool, or a region such as 'box:0,0,10,10', not {mask.dtype} of shape {mask.shape}")
+    if not mask.any():
+        raise Error("`mask` is true nowhere: there is no region to fill")
+    if mask.all():
+        raise Error("`mask` is true everywhere: nothing is left that could continue into the region")
     array = None if _meshes.of_path(shape) is not None or _meshes.of(shape) is not None else np.asarray(shape)
     if array is not None and np.issubdtype(array.dtype, np.floating):
         if mask.shape != array.shape:
@@ -129,24 +171,27 @@ def of_voxels(labels: Any, *, affine: Any = None, spacing: Any = None, origin: A
         affine = labels.affine if affine is None else affine
         values = np.asanyarray(labels.dataobj)
     elif hasattr(labels, "dimensions") and hasattr(labels, "point_data"):
-        values, spacing, origin = _of_grid(labels, spacing, origin)
+        values, of_grid = _of_grid(labels)
+        affine = of_grid if affine is None else affine
     else:
-        values = np.asarray(labels)
+        values = _meshes.array("labels", labels)
     if values.ndim != 3:
         raise Error(f"a segmentation has three dimensions, not the shape {values.shape}")
     return Voxels(_plain(values), _affine(affine, spacing, origin))
 
 
-def _of_grid(grid: Any, spacing: Any, origin: Any) -> tuple[np.ndarray, Any, Any]:
-    dimensions, sides = np.array(grid.dimensions), np.array(grid.spacing, dtype=float)
-    first = np.array(grid.origin, dtype=float)
+def _of_grid(grid: Any) -> tuple[np.ndarray, np.ndarray]:
+    if not hasattr(grid, "spacing"):
+        raise Error(f"{type(grid).__name__} has voxels of many shapes: give an ImageData")
     scalars = grid.active_scalars
-    if scalars is None:
-        raise Error("the grid has no active scalars")
+    if scalars is None or np.ndim(scalars) != 1:
+        raise Error("the grid has no active scalars with one value for each voxel")
+    dimensions, first = np.array(grid.dimensions), np.array(grid.extent[::2], dtype=float)
     if grid.active_scalars_info.association.name == "CELL":
-        dimensions, first = dimensions - 1, first + 0.5 * sides
-    values = np.asarray(scalars).reshape(dimensions, order="F")
-    return values, sides if spacing is None else spacing, first if origin is None else origin
+        dimensions, first = dimensions - 1, first + 0.5
+    axes = np.asarray(getattr(grid, "direction_matrix", np.eye(3))) * np.asarray(grid.spacing)
+    affine = np.column_stack([axes, axes @ first + np.asarray(grid.origin)])
+    return np.asarray(scalars).reshape(dimensions, order="F"), affine
 
 
 def _plain(values: np.ndarray) -> np.ndarray:
@@ -169,10 +214,10 @@ def _affine(affine: Any, spacing: Any, origin: Any) -> np.ndarray:
     if affine is not None:
         if spacing is not None or origin is not None:
             raise Error("`affine` says where the voxels are: leave out `spacing` and `origin`")
-        affine = np.asarray(affine, dtype=np.float64)
+        affine = _meshes.reals("affine", affine)
         if affine.shape not in ((3, 4), (4, 4)):
             raise Error(f"`affine` must be an array of shape (4, 4), not {affine.shape}")
-        return affine[:3]
-    sides = np.broadcast_to(1.0 if spacing is None else spacing, (3,)).astype(float)
-    first = np.broadcast_to(0.0 if origin is None else origin, (3,)).astype(float)
+        return np.array(affine[:3])
+    sides = numbers("spacing", 1.0 if spacing is None else spacing, 3)
+    first = numbers("origin", 0.0 if origin is None else origin, 3)
     return np.column_stack([np.diag(sides), first])

@@ -10,9 +10,9 @@ import numpy as np
 from . import _inputs, _meshes, _willmore
 from ._flow import Flow
 from ._inputs import Source
-from ._options import named
+from ._options import in_memory
 from ._progress import Progress, told
-from ._results import Result, tell
+from ._results import Result, picture_of, tell
 from ._willmore import Error
 
 
@@ -81,12 +81,14 @@ def fair(
     Examples
     --------
     >>> import willmore
-    >>> smooth = willmore.fair("builtin:lever", energy_ratio=0.5, cells=24)
+    >>> smooth = willmore.fair("builtin:cube", steps=2, cells=24)
     >>> smooth.report["energy"] < smooth.report["first_energy"]
     True
     """
-    region = fixed if isinstance(fixed, str) or fixed is None else "colour:ff0000"
-    source = _inputs.of_shape(mesh, fixed=None if isinstance(fixed, str) else fixed)
+    region = _meshes.of_path(fixed)
+    source = _inputs.of_shape(mesh, fixed=None if region is not None else fixed)
+    if fixed is not None and region is None:
+        region = "colour:ff0000"
     ends = any(given is not None for given in (energy_ratio, energy, time, steps))
     if isinstance(volume, str) and volume == "keep" and (not ends or reduced_volume is not None):
         # Where noise is taken off, the volume stays anyway.
@@ -161,7 +163,7 @@ def surfaces(
     --------
     >>> import numpy as np, willmore
     >>> x, y, z = np.mgrid[:20, :20, :20] - 9.5
-    >>> ball = willmore.surfaces(x**2 + y**2 + z**2 < 49, spacing=2.0, cells=32)[1]
+    >>> ball = willmore.surfaces(x**2 + y**2 + z**2 < 49, spacing=2.0, cells=24)[1]
     >>> bool(abs(ball.report["volume"] / (8 * 1472) - 1) < 0.02)
     True
     """
@@ -178,7 +180,10 @@ def surfaces(
 
 def _labels_of(values: np.ndarray, label: int | Iterable[int] | None) -> list[int]:
     if label is not None:
-        return [int(one) for one in np.atleast_1d(np.asarray(list(label) if isinstance(label, Iterable) else label))]
+        several = np.ravel(list(label) if isinstance(label, (set, frozenset)) else _meshes.array("label", label))
+        if several.dtype.kind not in "biu" or len(several) == 0:
+            raise Error(f"`label` must be a whole number or several of them, not {label!r}")
+        return [int(one) for one in several]
     found = np.unique(values)
     if np.any(found != np.round(found)):
         raise Error("these are no labels, which are whole numbers: give `threshold`, above which is inside")
@@ -280,8 +285,11 @@ def flow(
         "cells": cells,
         **more,
     }
-    begun = _willmore.begin("flow", source.input, named({**source.options, **options}), told(progress))
-    tell(begun.warnings, stacklevel=3)
+    begun = _willmore.begin("flow", source.input, in_memory({**source.options, **options}), told(progress))
+    tell(begun.warnings)
+    if source.pixels is not None:
+        drawing = picture_of(begun.state.shape)
+        source = source if drawing is None else _inputs.coloured(source, drawing)
     return Flow(begun, source)
 
 
@@ -350,7 +358,7 @@ def inpaint(
     return _run("inpaint", source, options, progress, mask=_inputs.of_mask(shape, mask, spacing, origin))
 
 
-def repair(mesh: Any) -> Result | Any:
+def repair(mesh: Any) -> Any:
     """A closed mesh of one that is open, crosses itself or is not oriented alike.
 
     Parameters
@@ -361,7 +369,12 @@ def repair(mesh: Any) -> Result | Any:
     Returns
     -------
     mesh
-        A new mesh of this kind.
+        A new mesh of this kind; `Arrays` of a file.
+
+    Raises
+    ------
+    Error
+        Faces that enclose nothing.
 
     Warns
     -----
@@ -370,13 +383,13 @@ def repair(mesh: Any) -> Result | Any:
     """
     source = _inputs.of_shape(mesh)
     vertices, faces, changes = _willmore.repair(source.input)
-    tell([changes], stacklevel=3)
+    tell([changes])
     if source.mesh is None:
         return _meshes.Arrays(vertices, faces.astype(np.int64))
     return source.mesh.anew(vertices, faces)
 
 
 def _run(name: str, source: Source, options: dict[str, Any], progress: Progress, mask: Any = None) -> Result:
-    results = _willmore.run(name, source.input, named({**source.options, **options}), told(progress), mask)
+    results = _willmore.run(name, source.input, in_memory({**source.options, **options}), told(progress), mask)
     tell(results.warnings)
     return Result(results, source)

@@ -45,6 +45,8 @@ def of(mesh: Any) -> Kind | None:
         return _OfArrays(*mesh)
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return _OfTrimesh(mesh)
+    if hasattr(mesh, "points") and hasattr(mesh, "celltypes"):
+        raise Error(f"{type(mesh).__name__} may have cells of any kind: give its surface, `extract_surface()`")
     if hasattr(mesh, "points") and hasattr(mesh, "cells_dict"):
         return _OfMeshio(mesh)
     if hasattr(mesh, "points") and hasattr(mesh, "faces") and hasattr(mesh, "triangulate"):
@@ -54,8 +56,7 @@ def of(mesh: Any) -> Kind | None:
 
 def arrays(vertices: Any, faces: Any) -> Arrays:
     """Vertices in double precision and faces as they are taken by the library, both checked."""
-    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    faces = np.asarray(faces)
+    vertices, faces = reals("vertices", vertices), array("faces", faces)
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise Error(f"vertices must be an array of shape (n, 3), not {vertices.shape}")
     if faces.ndim != 2 or faces.shape[1] != 3 or not (np.issubdtype(faces.dtype, np.integer)):
@@ -69,6 +70,22 @@ def arrays(vertices: Any, faces: Any) -> Arrays:
     return Arrays(vertices, np.ascontiguousarray(faces, dtype=np.uint32))
 
 
+def array(name: str, values: Any) -> np.ndarray:
+    """An array of anything."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise Error(f"`{name}` must be an array, not {type(values).__name__} of parts of different lengths") from None
+
+
+def reals(name: str, values: Any) -> np.ndarray:
+    """An array of numbers in double precision."""
+    given = array(name, values)
+    if given.dtype.kind not in "biuf":
+        raise Error(f"`{name}` must be an array of numbers, not of {given.dtype}")
+    return np.ascontiguousarray(given, dtype=np.float64)
+
+
 def of_path(mesh: Any) -> str | None:
     """The name of a file, a built-in shape or a region."""
     return os.fspath(mesh) if isinstance(mesh, (str, os.PathLike)) else None
@@ -76,11 +93,11 @@ def of_path(mesh: Any) -> str | None:
 
 class _OfArrays:
     def __init__(self, vertices: Any, faces: Any):
-        self._kinds = np.asarray(vertices).dtype, np.asarray(faces).dtype
-        self.vertices, self.faces = vertices, faces
+        self.vertices, self.faces = array("vertices", vertices), array("faces", faces)
+        self._kinds = self.vertices.dtype, self.faces.dtype
 
     def moved(self, vertices: np.ndarray) -> Arrays:
-        return self.anew(vertices, np.array(self.faces))
+        return self.anew(vertices, self.faces)
 
     def anew(self, vertices: np.ndarray, faces: np.ndarray) -> Arrays:
         of_vertices, of_faces = self._kinds
@@ -122,7 +139,7 @@ class _OfPyvista:
 class _OfMeshio:
     def __init__(self, mesh: Any):
         self._mesh = mesh
-        blocks = dict(mesh.cells_dict)
+        blocks = {str(kind): cells for kind, cells in mesh.cells_dict.items()}
         faces = [np.asarray(blocks[kind]) for kind in ("triangle",) if kind in blocks]
         if "quad" in blocks:
             quads = np.asarray(blocks["quad"])

@@ -11,15 +11,26 @@ from ._willmore import Error
 
 Named = list[tuple[str, "str | None"]]
 
+_OF_FOLDERS = {"checkpoint_every", "force", "format", "frames", "no_page", "output", "save"}
+
 
 def named(options: dict[str, Any]) -> Named:
     """Names and texts of the options that are given."""
     pairs: Named = []
     for name, value in options.items():
-        if value is None or value is False:
+        if value is None or isinstance(value, (bool, np.bool_)) and not value:
             continue
-        pairs.append((name, None if value is True else _text(name, value)))
+        pairs.append((name, None if isinstance(value, (bool, np.bool_)) else _text(name, value)))
     return pairs
+
+
+def in_memory(options: dict[str, Any]) -> Named:
+    """Names and texts of the options of a job without a folder."""
+    given = named(options)
+    for name, _ in given:
+        if name.replace("-", "_") in _OF_FOLDERS:
+            raise Error(f"`{name}` is an option of runs in folders: see `Run.start`. Without a folder, results have a method `save`")
+    return given
 
 
 def _text(name: str, value: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import warnings as python_warnings
 from functools import cached_property
 from typing import Any
@@ -18,10 +19,16 @@ class WillmoreWarning(UserWarning):
     """Something that you should know before you trust a result."""
 
 
-def tell(messages: list[str], stacklevel: int = 4) -> None:
-    """Raises the warnings of a job as those of Python."""
+_FOLDER = os.path.join(os.path.dirname(__file__), "")
+
+
+def tell(messages: list[str]) -> None:
+    """Raises the warnings of a job as those of Python, at the line that called this package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_FOLDER):
+        level, frame = level + 1, frame.f_back
     for message in messages:
-        python_warnings.warn(message, WillmoreWarning, stacklevel=stacklevel)
+        python_warnings.warn(message, WillmoreWarning, stacklevel=level)
 
 
 class Result:
@@ -33,7 +40,8 @@ class Result:
         The surface: a copy of the mesh that came in, of the same kind, with its vertices moved; or a new mesh of that kind. `Arrays` for
         other inputs, None for curves.
     image : array or None
-        The picture of a curve, of the shape and type of the image that came in; for a mask, a mask. Red, green, blue and opacity for other inputs.
+        The picture of a curve, of the shape, type and colours of the image that came in; for a mask, a mask. Red, green, blue and opacity for other
+        inputs.
     field : array of float
         The phase field, 1 inside and -1 outside.
     spacing, origin
@@ -85,7 +93,7 @@ class Result:
 
     @cached_property
     def metrics(self) -> dict[str, np.ndarray]:
-        return columns([flat(record) for record in json.loads(self._results.records)])
+        return columns([row(record) for record in json.loads(self._results.records)])
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg).
@@ -139,9 +147,10 @@ def mesh_of(shape: Shape, source: Source) -> Any:
     """The surface as the kind of mesh that came in."""
     from ._meshes import Arrays
 
-    if shape.mesh is None:
+    made = shape.mesh
+    if made is None:
         return None
-    vertices, faces = shape.mesh
+    vertices, faces = made
     kind = source.mesh
     if kind is None:
         return Arrays(vertices, faces.astype(np.int64))
@@ -152,11 +161,17 @@ def mesh_of(shape: Shape, source: Source) -> Any:
 
 def image_of(shape: Shape, source: Source) -> np.ndarray | None:
     """The picture of a curve as the kind of image that came in."""
-    if shape.picture is None:
+    picture = picture_of(shape)
+    return picture if picture is None or source.image is None else source.image(picture)
+
+
+def picture_of(shape: Shape) -> np.ndarray | None:
+    """Red, green, blue and opacity of the picture of a curve."""
+    made = shape.picture
+    if made is None:
         return None
-    pixels, (width, height) = shape.picture
-    picture = pixels.reshape(height, width, 4)
-    return picture if source.image is None else source.image(picture)
+    pixels, (width, height) = made
+    return pixels.reshape(height, width, 4)
 
 
 def field_of(of: Any) -> tuple[np.ndarray, float, np.ndarray]:
@@ -166,13 +181,22 @@ def field_of(of: Any) -> tuple[np.ndarray, float, np.ndarray]:
 
 
 def flat(record: dict[str, Any]) -> dict[str, Any]:
-    """A record whose groups are taken apart, but for the estimates of the time steps."""
-    values: dict[str, Any] = {}
-    for name, value in record.items():
-        if isinstance(value, dict):
-            values.update(flat(value))
-        elif not isinstance(value, list):
-            values[name] = value
+    """A record whose groups are taken apart. A name that is in a group too has the value outside of it."""
+    own = {name: value for name, value in record.items() if not isinstance(value, (dict, list))}
+    inner: dict[str, Any] = {}
+    for group in record.values():
+        if isinstance(group, dict):
+            inner.update(flat(group))
+    return {**own, **inner, **own}
+
+
+def row(record: dict[str, Any]) -> dict[str, Any]:
+    """The numbers of a step by their names, as in ``metrics.csv``."""
+    values = flat(record)
+    made = record.get("minimization")
+    if made is not None:
+        # Products with the Hessian are also made by the first guess, and by steps that were refused.
+        values["hvp"] = record.get("refused_hvp", 0) + made["start"]["hvp"] + made["newton"]["hvp"]
     return values
 
 

@@ -14,6 +14,7 @@ from . import _inputs, _meshes, _willmore
 from ._options import named
 from ._progress import Progress, told
 from ._results import columns, tell
+from ._training import Network
 from ._willmore import Error
 
 
@@ -36,6 +37,15 @@ class Run:
     @classmethod
     def open(cls, folder: str | os.PathLike[str]) -> Run:
         """The run in a folder.
+
+        Parameters
+        ----------
+        folder
+            The folder.
+
+        Returns
+        -------
+        Run
 
         Raises
         ------
@@ -73,7 +83,7 @@ class Run:
         progress : bool or callable
             Show progress, or call ``progress(title, done, parts)``.
         **options
-            Those of the program, with underscores.
+            Those of the program, with underscores. A ``network`` must be a file, which is there when the run is resumed.
 
         Returns
         -------
@@ -85,6 +95,8 @@ class Run:
         Error
             A shape or an option that is refused.
         """
+        if isinstance(options.get("network"), Network):
+            raise Error("`network` of a run must be a file, which is there when the run is resumed: save the network, and give its path")
         source = _inputs.of_shape(shape, spacing=spacing, origin=origin)
         region = None if mask is None else _inputs.of_mask(shape, mask, spacing, origin)
         given = named({**source.options, **options, "output": folder})
@@ -117,7 +129,7 @@ class Run:
         return self._ended(outcome, warnings)
 
     def _ended(self, outcome: str, warnings: list[str]) -> Run:
-        tell(warnings, stacklevel=4)
+        tell(warnings)
         if not json.loads(outcome).get("finished"):
             raise KeyboardInterrupt
         return self
@@ -130,7 +142,8 @@ class Run:
     @property
     def report(self) -> dict[str, Any]:
         path = self.folder / "summary.json"
-        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        return report
 
     @property
     def metrics(self) -> dict[str, np.ndarray]:
@@ -141,7 +154,11 @@ class Run:
     @property
     def field(self) -> np.ndarray:
         """The phase field at the end."""
-        return np.load(self.folder / "final.npy")
+        path = self.folder / "final.npy"
+        if not path.exists():
+            raise Error(f"{self.folder} has no field yet: resume the run")
+        field: np.ndarray = np.load(path)
+        return field
 
     @property
     def mesh(self) -> _meshes.Arrays | None:

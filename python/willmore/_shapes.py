@@ -33,9 +33,9 @@ def signed_distance(mesh: Any, points: Any) -> np.ndarray:
     kind = _meshes.of(mesh)
     if kind is None:
         raise Error(f"{type(mesh).__name__} is no mesh")
-    points = np.asarray(points, dtype=np.float64)
+    points = _meshes.reals("points", points)
     if points.shape[-1:] != (3,):
-        raise Error(f"points must be an array of shape (..., 3), not {points.shape}")
+        raise Error(f"`points` must be an array of shape (..., 3), not {points.shape}")
     flat = np.ascontiguousarray(points.reshape(-1, 3))
     distances = _willmore.signed_distances(*_meshes.arrays(kind.vertices, kind.faces), flat)
     return distances.reshape(points.shape[:-1])
@@ -57,12 +57,19 @@ def zero_level(field: Any, *, spacing: float = 1.0, origin: Any = 0.0) -> Any:
     -------
     list of (m, 2) arrays, or Arrays
         Closed curves in the plane, a closed surface in space.
+
+    Raises
+    ------
+    Error
+        A field that is positive everywhere or nowhere.
     """
-    values = np.ascontiguousarray(field, dtype=np.float64)
+    values = _meshes.reals("field", field)
     if values.ndim not in (2, 3) or len(set(values.shape)) != 1:
         raise Error(f"a field has two or three axes with as many nodes along each, not the shape {values.shape}")
-    first = np.broadcast_to(origin, (values.ndim,)).astype(float).tolist()
+    if not values.size or not values.min() <= 0 < values.max():
+        raise Error("the field has no zero level: it is positive everywhere or nowhere, or not finite")
+    side, first = _inputs.numbers("spacing", spacing, 1)[0], _inputs.numbers("origin", origin, values.ndim)
     if values.ndim == 2:
-        return _willmore.zero_curves(values, float(spacing), first)
-    vertices, faces = _willmore.zero_surface(values, float(spacing), first)
+        return _willmore.zero_curves(values, side, first)
+    vertices, faces = _willmore.zero_surface(values, side, first)
     return _meshes.Arrays(vertices, faces.astype(np.int64))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
+import weakref
 from functools import cached_property
 from typing import Any
 
@@ -39,6 +41,15 @@ class Network:
     def load(cls, path: str | os.PathLike[str]) -> Network:
         """The network in a file (.safetensors).
 
+        Parameters
+        ----------
+        path
+            The file.
+
+        Returns
+        -------
+        Network
+
         Raises
         ------
         Error
@@ -47,7 +58,18 @@ class Network:
         return cls(NetworkData.load(os.fspath(path)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the network to a file (.safetensors), which the program takes too."""
+        """Writes the network to a file (.safetensors), which the program takes too.
+
+        Parameters
+        ----------
+        path
+            The file. One that is there is written over.
+
+        Raises
+        ------
+        Error
+            A file that cannot be written.
+        """
         self._data.save(os.fspath(path))
 
     @property
@@ -56,17 +78,20 @@ class Network:
 
     @property
     def calibration(self) -> dict[str, Any]:
-        return json.loads(self._data.calibration)
+        calibration: dict[str, Any] = json.loads(self._data.calibration)
+        return calibration
 
     @cached_property
-    def _folder(self) -> tempfile.TemporaryDirectory[str]:
-        return tempfile.TemporaryDirectory(prefix="willmore-")
+    def _path(self) -> str:
+        """A file that is there as long as this object."""
+        folder = tempfile.mkdtemp(prefix="willmore-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        path = os.path.join(folder, "network.safetensors")
+        self.save(path)
+        return path
 
     def __fspath__(self) -> str:
-        path = os.path.join(self._folder.name, "network.safetensors")
-        if not os.path.exists(path):
-            self.save(path)
-        return path
+        return self._path
 
     def __repr__(self) -> str:
         return f"<Network for {self.ratios}>"

@@ -105,7 +105,9 @@ def vesicle(
 def vesicle(
     reduced_volume: Sequence[float], *, branch: _Branch = "oblate", spontaneous_curvature: float = 0.0
 ) -> list[Vesicle]: ...
-def vesicle(reduced_volume, *, branch="oblate", spontaneous_curvature=0.0):
+def vesicle(
+    reduced_volume: float | Sequence[float], *, branch: _Branch = "oblate", spontaneous_curvature: float = 0.0
+) -> Vesicle | list[Vesicle]:
     """Axisymmetric vesicles in equilibrium, of area ``4 pi``.
 
     Parameters
@@ -141,5 +143,17 @@ def vesicle(reduced_volume, *, branch="oblate", spontaneous_curvature=0.0):
 
 
 def circle_radius(radius: float, time: float) -> float:
-    """The radius of a circle under Willmore flow, ``(R^4 + 2 t)^(1/4)``."""
-    return (radius**4 + 2.0 * time) ** 0.25
+    """The radius of a circle under Willmore flow, ``(R^4 + 2 t)^(1/4)``.
+
+    Parameters
+    ----------
+    radius : float
+        The radius ``R`` at time 0.
+    time : float
+        The time ``t``.
+
+    Returns
+    -------
+    float
+    """
+    return float((radius**4 + 2.0 * time) ** 0.25)
