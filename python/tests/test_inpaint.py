@@ -54,7 +54,6 @@ def test_fields_stay_outside_of_the_mask_bit_for_bit():
     assert len(x) and x.min() > 7.9 and x.max() < 9.5 and y.min() > 8.5 and y.max() < 10.3
 
 
-@pytest.mark.xfail(strict=True, reason="where nothing is stored, results in memory have the values of the pure phases")
 def test_large_fields_stay_outside_of_the_mask_bit_for_bit():
     field, _ = circle_field(cells=128)
     mask = np.zeros(field.shape, bool)

@@ -26,6 +26,16 @@ def test_version():
         assert version and version[1] == willmore.__version__, manifest
 
 
+def test_the_profile_is_that_of_the_program():
+    tomllib = pytest.importorskip("tomllib")
+    if not (FOLDER / "Cargo.toml").exists():
+        pytest.skip("not in the folder of the sources")
+    package, program = (tomllib.loads(path.read_text(encoding="utf-8"))["profile"]["dev"] for path in (FOLDER / "Cargo.toml", FOLDER.parent / "Cargo.toml"))
+    # The experiments are no part of the package.
+    del program["package"]["experiments"]
+    assert package == program
+
+
 def test_import_is_quick():
     script = "import numpy, time; begun = time.perf_counter(); import willmore; print(time.perf_counter() - begun)"
     times = [float(subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout) for _ in range(5)]

@@ -151,3 +151,8 @@ def test_refused_grids():
             willmore.surfaces(labels, **options)
     with pytest.raises(willmore.Error, match="`surfaces`"):
         willmore.flow(image)
+
+
+def test_the_label_of_the_outside_is_refused():
+    with pytest.raises(willmore.Error, match="outside"):
+        willmore.surfaces(np.ones((4, 4, 4), np.uint8), label=[1, 0])

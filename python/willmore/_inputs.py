@@ -175,6 +175,8 @@ def of_voxels(labels: Any, *, affine: Any = None, spacing: Any = None, origin: A
         affine = of_grid if affine is None else affine
     else:
         values = _meshes.array("labels", labels)
+    if values.ndim == 4 and values.shape[3] == 1:
+        values = values[:, :, :, 0]
     if values.ndim != 3:
         raise Error(f"a segmentation has three dimensions, not the shape {values.shape}")
     return Voxels(_plain(values), _affine(affine, spacing, origin))

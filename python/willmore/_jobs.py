@@ -183,6 +183,8 @@ def _labels_of(values: np.ndarray, label: int | Iterable[int] | None) -> list[in
         several = np.ravel(list(label) if isinstance(label, (set, frozenset)) else _meshes.array("label", label))
         if several.dtype.kind not in "biu" or len(several) == 0:
             raise Error(f"`label` must be a whole number or several of them, not {label!r}")
+        if 0 in several:
+            raise Error("`label` 0 is outside: give other labels, or a mask such as `labels == 0`")
         return [int(one) for one in several]
     found = np.unique(values)
     if np.any(found != np.round(found)):

@@ -119,7 +119,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             summary: self.summary(run, topology, mesh),
             ended: run.ended(),
             records: run.records().to_vec(),
-            field: u.clone(),
+            field: seen(run),
             shape,
         })
     }
@@ -282,6 +282,14 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             None => self.presentation.encode(u, eps, &format)?,
         };
         Ok(files::write_atomically(path, |out| out.write_all(&bytes))?)
+    }
+}
+
+/// The phase field at the present time, with the values that a region keeps where no brick is stored.
+pub fn seen<const D: usize>(run: &Run<D>) -> Stored<D> {
+    match run.case().region {
+        Some(_) => Stored::whole(run.field().clone()),
+        None => run.stored().clone(),
     }
 }
 

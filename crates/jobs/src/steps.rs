@@ -6,7 +6,7 @@ use crate::input::Opened;
 use crate::made::{Made, Results, Shape};
 use crate::prelude::*;
 use crate::presentation::Presentation;
-use crate::run::Plan;
+use crate::run::{Plan, seen};
 
 /// A job in memory that makes a step when it is asked for one: an iterator over the records of the steps.
 ///
@@ -173,7 +173,7 @@ where
         Arc::new(Moment {
             plan: self.plan.clone(),
             start: self.start.clone(),
-            u: self.run.stored().clone(),
+            u: seen(&self.run),
             eps: self.run.case().scales.eps,
         })
     }
