@@ -90,8 +90,8 @@ fn a_run_that_is_not_finished_shows_its_surface() {
     }
 
     let folder = tempfile::tempdir().unwrap();
-    let mut options = FlowOptions::of("builtin:cube");
-    options.input.cells = Some(24);
+    let mut options = FlowOptions::of("builtin:torus");
+    options.input.cells = Some(40);
     (options.run.steps, options.run.frames) = (Some(3), Some(1));
     options.run.output = Some(folder.path().join("run"));
     let watcher = Impatient(Interrupt::never());
