@@ -27,7 +27,7 @@ pub fn of_job(error: jobs::Error) -> PyErr {
 }
 
 /// Messages name the parameters of the library. In Python some have other names.
-fn in_python(message: &str) -> String {
+pub fn in_python(message: &str) -> String {
     // How to type a value that looks like an option is no advice here.
     let (message, _) = message.split_once("; to pass `").unwrap_or((message, ""));
     message

@@ -9,7 +9,7 @@ use willmore::jobs::{
 };
 use willmore::prelude as w;
 
-use crate::error::{Error, detached, of_job, raised};
+use crate::error::{Error, detached, in_python, of_job, raised};
 use crate::input::Input;
 use crate::shape::{FieldArray, PyShape, field_array};
 use crate::watcher::PyWatcher;
@@ -51,6 +51,18 @@ pub struct PyResults {
     warnings: Vec<String>,
     #[pyo3(get)]
     notes: Vec<String>,
+}
+
+impl PyResults {
+    /// What may have gone wrong is told with what was told before.
+    fn new(results: Results, mut warnings: Vec<String>, notes: Vec<String>) -> Self {
+        warnings.extend(results.summary().doubts().into_iter().map(in_python));
+        Self {
+            results,
+            warnings,
+            notes,
+        }
+    }
 }
 
 #[pymethods]
@@ -109,11 +121,7 @@ pub fn run(
     let watcher = PyWatcher::new(progress);
     let made = detached(py, || jobs::run_in_memory(job, &watcher).map_err(of_job));
     let results = watcher.check(made)?;
-    Ok(PyResults {
-        results,
-        warnings: watcher.warnings(),
-        notes: watcher.notes(),
-    })
+    Ok(PyResults::new(results, watcher.warnings(), watcher.notes()))
 }
 
 /// Does a job in a folder, and returns what came out, as JSON. Interrupted, it can be resumed.
@@ -181,12 +189,32 @@ impl PySteps {
 
 #[pymethods]
 impl PySteps {
-    /// Makes a step, and returns its record as JSON; nothing once the flow is over.
-    fn step(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        self.with(py, |steps| {
-            let record = steps.next().transpose().map_err(of_job)?;
-            record.as_ref().map(json).transpose()
-        })
+    /// Makes a step, unless the flow is over, and says whether it made one.
+    fn step(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |steps| Ok(steps.next().transpose().map_err(of_job)?.is_some()))
+    }
+
+    /// The number of records so far.
+    #[getter]
+    fn made(&self, py: Python<'_>) -> PyResult<usize> {
+        self.with(py, |steps| Ok(steps.records().len()))
+    }
+
+    /// A record, as JSON.
+    fn record(&self, py: Python<'_>, number: usize) -> PyResult<Option<String>> {
+        self.with(py, |steps| steps.records().get(number).map(json).transpose())
+    }
+
+    /// Parts and holes in words, unless the shape touches itself or has vanished.
+    #[getter]
+    fn topology(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |steps| Ok(steps.topology().map(|topology| topology.to_string())))
+    }
+
+    /// Whether the shape touches the side of the box.
+    #[getter]
+    fn touches_box(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |steps| Ok(steps.touches_box()))
     }
 
     /// The measures at the beginning, as JSON.
@@ -210,11 +238,7 @@ impl PySteps {
     /// The results so far.
     fn results(&self, py: Python<'_>) -> PyResult<PyResults> {
         let results = self.with(py, |steps| steps.results().map_err(of_job))?;
-        Ok(PyResults {
-            results,
-            warnings: self.warnings.clone(),
-            notes: self.notes.clone(),
-        })
+        Ok(PyResults::new(results, self.warnings.clone(), self.notes.clone()))
     }
 }
 

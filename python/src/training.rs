@@ -3,9 +3,9 @@
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use willmore::jobs::{self, TrainOptions};
-use willmore::model;
+use willmore::model::{self, Shipped};
 
-use crate::error::{detached, of_job, raised};
+use crate::error::{Error, detached, of_job, raised};
 use crate::job::{Options, json, read};
 use crate::watcher::PyWatcher;
 
@@ -18,6 +18,20 @@ impl PyNetwork {
     #[staticmethod]
     fn load(path: &str) -> PyResult<Self> {
         model::Network::load(path.as_ref()).map(Self).map_err(|error| raised(&error))
+    }
+
+    /// One of those that come with the package, by its name in the list of `willmore networks`.
+    #[staticmethod]
+    fn shipped(name: &str) -> PyResult<Self> {
+        let all = [Shipped::Accurate, Shipped::Paper].map(Shipped::all);
+        for shipped in all {
+            let shipped = shipped.map_err(|error| raised(&error))?;
+            let mut named = shipped.into_iter();
+            if let Some((_, network)) = named.find(|(of, _)| of.trim_end_matches(".safetensors") == name) {
+                return Ok(Self(network));
+            }
+        }
+        Err(Error::new_err(format!("there is no network {name:?}: `willmore networks` lists them")))
     }
 
     fn save(&self, path: &str) -> PyResult<()> {

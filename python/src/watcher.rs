@@ -58,6 +58,7 @@ impl Watcher for PyWatcher {
             title: title.to_owned(),
             parts,
             done: AtomicU64::new(0),
+            told: Mutex::default(),
             progress: self.progress.clone(),
             interrupt: self.interrupt.clone(),
             raised: self.raised.clone(),
@@ -73,13 +74,20 @@ struct Bar {
     title: String,
     parts: u64,
     done: AtomicU64,
+    told: Mutex<Option<u64>>,
     progress: Option<Arc<Py<PyAny>>>,
     interrupt: Interrupt,
     raised: Arc<Mutex<Option<PyErr>>>,
 }
 
 impl Bar {
+    /// Threads of a pool arrive in any order, and what is told never goes back.
     fn tell(&self, done: u64) {
+        let mut last = locked(&self.told);
+        if last.is_some_and(|last| done <= last) {
+            return;
+        }
+        *last = Some(done);
         let told = Python::attach(|py| {
             py.check_signals()?;
             match &self.progress {

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _results
 from ._inputs import Source
-from ._results import Result
+from ._results import Result, tell
 from ._willmore import State as _State
 from ._willmore import Steps
 
@@ -112,17 +112,36 @@ class Flow(Iterator[State]):
         self.warnings: list[str] = steps.warnings
         self.notes: list[str] = steps.notes
         self.start = State(steps.state, source, {}, json.loads(steps.start))
+        # Records that became states.
+        self._told = 0
+        self._topology, self._touches_box = steps.topology, steps.touches_box
 
     @property
     def ended(self) -> str | None:
         return self._steps.ended
 
     def __next__(self) -> State:
-        while (text := self._steps.step()) is not None:
-            record = json.loads(text)
+        while True:
+            # A step that Ctrl-C came after is made, and not told yet.
+            if self._told == self._steps.made and not self._steps.step():
+                raise StopIteration
+            record = json.loads(self._steps.record(self._told) or "{}")
+            self._told += 1
             if record["completes_step"]:
+                self._doubt(record["step"])
                 return State(self._steps.state, self._source, _results.row(record), record["measures"])
-        raise StopIteration
+
+    def _doubt(self, step: int) -> None:
+        """Warns when parts or holes come or go, and when the shape touches the side of the box."""
+        doubts = []
+        topology, touches_box = self._steps.topology, self._steps.touches_box
+        if None not in (topology, self._topology) and topology != self._topology:
+            doubts.append(f"step {step}: parts or holes have come or gone, {topology} where there were {self._topology}")
+        if touches_box and not self._touches_box:
+            doubts.append(f"step {step}: the shape touches the side of the box, beyond which is its periodic image; a smaller `side_length` gives it room")
+        self._topology, self._touches_box = topology or self._topology, touches_box
+        self.warnings += doubts
+        tell(doubts)
 
     def run(self) -> Result:
         """Makes all steps to the end of the flow, and returns what came out."""

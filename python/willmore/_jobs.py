@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Iterable
+from typing import Any, Iterable, Literal
 
 import numpy as np
 
@@ -87,6 +87,8 @@ def fair(
     """
     region = _meshes.of_path(fixed)
     source = _inputs.of_shape(mesh, fixed=None if region is not None else fixed)
+    if source.mesh is None and _meshes.of_path(mesh) is None:
+        raise Error("`fair` takes a mesh: give (vertices, faces), or a mesh of trimesh, pyvista or meshio. `surfaces` takes segmentations, `flow` images and fields")
     if fixed is not None and region is None:
         region = "colour:ff0000"
     ends = any(given is not None for given in (energy_ratio, energy, time, steps))
@@ -200,6 +202,7 @@ def flow(
     *,
     spacing: float | None = None,
     origin: Any = None,
+    field_kind: Literal["phase-field", "distance"] | None = None,
     steps: int | None = None,
     time: float | None = None,
     tolerance: Any = None,
@@ -226,6 +229,9 @@ def flow(
         outside; the name of a file; or a built-in shape such as ``"builtin:torus"``.
     spacing, origin : optional
         The distance of neighbouring nodes of a field, and the position of its first node; by default 1 and 0.
+    field_kind : {"phase-field", "distance"}, optional
+        The values of a field: a phase field (default), whose profile across the interface is ``tanh(-3 s / (4 eps))`` at the signed distance ``s``,
+        with ``eps`` of two cells; or signed distances, negative inside, of which the package makes one.
     steps : int, optional
         Stop after so many steps; by default 20, or 1000 where something else ends the flow.
     time : float, optional
@@ -271,6 +277,7 @@ def flow(
     """
     source = _inputs.of_shape(shape, spacing=spacing, origin=origin)
     options = {
+        "field_kind": field_kind,
         "steps": steps,
         "time": time,
         "tolerance": tolerance,
@@ -326,6 +333,7 @@ def inpaint(
     ansatz: str | None = None,
     spacing: float | None = None,
     origin: Any = None,
+    field_kind: Literal["phase-field", "distance"] | None = None,
     steps: int | None = None,
     cells: int | None = None,
     progress: Progress = False,
@@ -342,7 +350,7 @@ def inpaint(
         pixels from the lower left corner.
     ansatz : str, optional
         The shape in the region at the beginning: ``"keep"`` (default), ``"empty"``, ``"full"``, or a region.
-    spacing, origin, steps, cells, progress, **more
+    spacing, origin, field_kind, steps, cells, progress, **more
         As in `flow`.
 
     Returns
@@ -356,7 +364,7 @@ def inpaint(
         A shape, a mask or an option that is refused.
     """
     source = _inputs.of_shape(shape, spacing=spacing, origin=origin)
-    options = {"ansatz": ansatz, "steps": steps, "cells": cells, **more}
+    options = {"ansatz": ansatz, "field_kind": field_kind, "steps": steps, "cells": cells, **more}
     return _run("inpaint", source, options, progress, mask=_inputs.of_mask(shape, mask, spacing, origin))
 
 

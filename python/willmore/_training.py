@@ -57,6 +57,26 @@ class Network:
         """
         return cls(NetworkData.load(os.fspath(path)))
 
+    @classmethod
+    def shipped(cls, name: str) -> Network:
+        """A network that comes with the package.
+
+        Parameters
+        ----------
+        name : str
+            Its name in the list of ``willmore networks``, such as ``"d2_k17_eps2_step1"``.
+
+        Returns
+        -------
+        Network
+
+        Raises
+        ------
+        Error
+            A name that is not in the list.
+        """
+        return cls(NetworkData.shipped(name))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the network to a file (.safetensors), which the program takes too.
 
@@ -121,7 +141,7 @@ def train_operator(
     step_over_h2 : float, optional
         Time step in squared cells, by default ``eps_over_h**2 / 4``, which flows need.
     quick : bool
-        Train for seconds, to try it out; such a network is not accurate.
+        Train for seconds, to try it out. Such a network is not accurate. Its `held_out_loss` is that of two spheres, in place of twenty.
     seed : int
         Seed of the random numbers.
     device : str, optional

@@ -194,8 +194,8 @@ impl Summary {
         sizes.reduce(|all, next| format!("{all}, {next}"))
     }
 
-    /// What may have gone wrong.
-    fn doubts(&self) -> Vec<&'static str> {
+    /// What may have gone wrong, each in a sentence: vertices left behind, parts or holes that have come or gone, a shape that touches the box.
+    pub fn doubts(&self) -> Vec<&'static str> {
         let left_behind = self.mesh.as_ref().and_then(|mesh| mesh.left_behind_percent);
         let is_new = left_behind.is_none();
         let notes = [

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use geometry::measure::touches_side;
+
 use crate::input::Opened;
 use crate::made::{Made, Results, Shape};
 use crate::prelude::*;
-use crate::presentation::Presentation;
+use crate::presentation::{Presentation, Topology};
 use crate::run::{Plan, seen};
 
 /// A job in memory that makes a step when it is asked for one: an iterator over the records of the steps.
@@ -50,6 +52,16 @@ impl Steps {
     /// The measures of the shape at the beginning.
     pub fn start(&self) -> &engine::Values {
         self.0.start()
+    }
+
+    /// The parts and holes of the shape now, unless it touches itself or has vanished.
+    pub fn topology(&self) -> Option<Topology> {
+        self.0.topology()
+    }
+
+    /// Whether the shape touches the side of the box, beyond which its periodic image is.
+    pub fn touches_box(&self) -> bool {
+        self.0.touches_box()
     }
 
     /// The present time.
@@ -136,6 +148,8 @@ trait Stage: Send {
     fn records(&self) -> &[Record];
     fn start(&self) -> &engine::Values;
     fn ended(&self) -> Option<Stop>;
+    fn topology(&self) -> Option<Topology>;
+    fn touches_box(&self) -> bool;
     fn state(&self) -> Arc<dyn Snapshot>;
     fn results(&self) -> Result<Results>;
     fn step(&mut self) -> Result<Option<Record>>;
@@ -167,6 +181,19 @@ where
 
     fn ended(&self) -> Option<Stop> {
         self.run.ended()
+    }
+
+    fn topology(&self) -> Option<Topology> {
+        let u = self.run.stored();
+        if !has_interface(u) {
+            return None;
+        }
+        let eps = self.run.case().scales.eps;
+        self.plan.presentation.topology(u, eps).ok()
+    }
+
+    fn touches_box(&self) -> bool {
+        touches_side(self.run.stored(), -0.5)
     }
 
     fn state(&self) -> Arc<dyn Snapshot> {
