@@ -114,34 +114,26 @@ fn header(shape: &[usize]) -> Vec<u8> {
 /// # Errors
 /// See [`read`].
 pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyError> {
-    let (header, data) = split(bytes)?;
-    let header = Header::parse(header)?;
-    let (number, big_endian) = number(header.descr.as_str().unwrap_or("a record"))?;
-    let shape = header.shape;
+    let array = Array::of(bytes)?;
+    if array.number.is_integer() {
+        let found = array.data_type;
+        return Err(NpyError::DataType { found });
+    }
+    let shape = &array.shape;
     if shape.len() != D {
-        return Err(NpyError::Rank { expected: D, shape });
+        return Err(NpyError::Rank {
+            expected: D,
+            shape: array.shape,
+        });
     }
     let side = shape.first().copied().unwrap_or(0);
     if shape.iter().any(|&s| s != side) {
-        return Err(NpyError::NotCubical { shape });
+        return Err(NpyError::NotCubical { shape: array.shape });
     }
-    let count = shape
-        .iter()
-        .try_fold(1_u64, |product, &s| product.checked_mul(s));
-    let expected = count.and_then(|count| count.checked_mul(number.size() as u64));
-    if expected != Some(data.len() as u64) {
-        let before = (bytes.len() - data.len()) as u64;
-        return Err(NpyError::Length {
-            expected: expected.unwrap_or(u64::MAX).saturating_add(before),
-            found: bytes.len() as u64,
-        });
-    }
-    let stored: Vec<f64> = data
-        .chunks_exact(number.size())
-        .map(|b| number.decode(b, big_endian))
-        .collect();
+    array.check_length()?;
+    let stored: Vec<f64> = array.values().collect();
     let cells = side as usize;
-    let values = if header.fortran_order {
+    let values = if array.fortran_order {
         (0..stored.len())
             .map(|index| stored[reversed::<D>(index, cells)])
             .collect()
@@ -151,6 +143,71 @@ pub fn decode<const D: usize>(bytes: &[u8]) -> Result<(usize, Vec<f64>), NpyErro
     match values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
         None => Ok((cells, values)),
         Some((index, &value)) => Err(NpyError::NonFinite { index, value }),
+    }
+}
+
+/// An array as it is in a file.
+#[derive(Clone, Debug)]
+pub struct Array<'a> {
+    /// Sides of the array.
+    pub shape: Vec<u64>,
+    /// The type as written in the header, shortened.
+    pub data_type: String,
+    /// What the elements are; bool is `U8`.
+    pub number: Number,
+    /// Whether the highest byte of a number is the first one.
+    pub big_endian: bool,
+    /// Whether the first axis runs fastest, and not the last one.
+    pub fortran_order: bool,
+    /// All bytes behind the header.
+    pub data: &'a [u8],
+    /// How many bytes are before these.
+    before: usize,
+}
+
+impl<'a> Array<'a> {
+    /// The array in the bytes of a file. There may be fewer or more elements than its shape says: see [`Array::check_length`].
+    ///
+    /// # Errors
+    /// A file that is not NPY, a damaged header, and elements that are neither bool nor real numbers of 32 or 64 bits or whole ones.
+    pub fn of(bytes: &'a [u8]) -> Result<Self, NpyError> {
+        let (header, data) = split(bytes)?;
+        let header = Header::parse(header)?;
+        let data_type = header.descr.as_str().unwrap_or("a record");
+        let (number, big_endian) = number(data_type)?;
+        Ok(Self {
+            data_type: files::shortened(data_type, 20),
+            shape: header.shape,
+            number,
+            big_endian,
+            fortran_order: header.fortran_order,
+            data,
+            before: bytes.len() - data.len(),
+        })
+    }
+
+    /// The elements that are there, as they are ordered in the file.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        let elements = self.data.chunks_exact(self.number.size());
+        elements.map(|element| self.number.decode(element, self.big_endian))
+    }
+
+    /// Whether there are as many elements as the shape says.
+    ///
+    /// # Errors
+    /// [`NpyError::Length`] if not.
+    pub fn check_length(&self) -> Result<(), NpyError> {
+        let size = self.number.size() as u64;
+        let mut sides = self.shape.iter();
+        let expected = sides.try_fold(size, |product, &s| product.checked_mul(s));
+        if expected == Some(self.data.len() as u64) {
+            return Ok(());
+        }
+        let before = self.before as u64;
+        Err(NpyError::Length {
+            expected: expected.unwrap_or(u64::MAX).saturating_add(before),
+            found: before + self.data.len() as u64,
+        })
     }
 }
 
@@ -197,16 +254,26 @@ fn number(data_type: &str) -> Result<(Number, bool), NpyError> {
     let (big_endian, kind) = match data_type.split_at_checked(1) {
         Some(("<", kind)) => (false, kind),
         Some((">", kind)) => (true, kind),
-        Some(("=", kind)) => (native_big, kind),
+        Some(("=" | "|", kind)) => (native_big, kind),
         _ => (native_big, data_type),
     };
-    match kind {
-        "f8" => Ok((Number::F64, big_endian)),
-        "f4" => Ok((Number::F32, big_endian)),
-        _ => Err(NpyError::DataType {
-            found: files::shortened(data_type, 20),
-        }),
-    }
+    let number = match kind {
+        "f8" => Number::F64,
+        "f4" => Number::F32,
+        "i1" => Number::I8,
+        "i2" => Number::I16,
+        "i4" => Number::I32,
+        "i8" => Number::I64,
+        "b1" | "u1" => Number::U8,
+        "u2" => Number::U16,
+        "u4" => Number::U32,
+        "u8" => Number::U64,
+        _ => {
+            let found = files::shortened(data_type, 20);
+            return Err(NpyError::DataType { found });
+        }
+    };
+    Ok((number, big_endian))
 }
 
 /// The three entries of the dictionary.

@@ -14,7 +14,9 @@ pub enum NpyError {
     HeaderLength { length: usize, limit: usize },
     #[error("the header is malformed: {reason}")]
     Header { reason: String },
-    #[error("elements have type {found}; save the array as float64 (float32 is accepted too)")]
+    #[error(
+        "elements have type {found}; save a field as float64 or float32, and labels in 3D as integers or bool"
+    )]
     DataType {
         /// The type as written in the header, shortened.
         found: String,
