@@ -6,6 +6,7 @@ use derive_more::Display;
 use glam::DVec3;
 use surfaces::{ClosedMesh, TriangleMesh, lattice_surface};
 
+use crate::volume::label_tolerance;
 use crate::{Error, Volume};
 
 /// More values than this are no labels.
@@ -33,8 +34,7 @@ pub enum Inside {
 impl Inside {
     fn holds(self, value: f64) -> bool {
         match self {
-            // Scaled values are rounded; neighbours of large labels are others.
-            Self::Label(label) => (value - label).abs() <= (1e-6 * label.abs()).clamp(1e-6, 0.4),
+            Self::Label(label) => (value - label).abs() <= label_tolerance(label),
             Self::Above(threshold) => value > threshold,
         }
     }
@@ -55,7 +55,7 @@ pub struct Body {
 
 impl Volume {
     /// The values in ascending order, each with the number of its voxels, if they can be labels: there are no more than 4096, all of
-    /// them whole.
+    /// them whole, up to the rounding of a scale. NaN is none of them.
     pub fn labels(&self) -> Option<Vec<(f64, usize)>> {
         let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
         let mut values = self.values().peekable();
@@ -65,6 +65,10 @@ impl Volume {
             while (values.next_if(|next| next.to_bits() == value.to_bits())).is_some() {
                 run += 1;
             }
+            if value.is_nan() {
+                continue;
+            }
+            let value = self.rounded(value);
             if value.fract() != 0.0 || value.abs() > 2_f64.powi(53) {
                 return None;
             }
@@ -84,7 +88,8 @@ impl Volume {
             .fold(all, |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// The body that some voxels are, of which there must be one, as a closed surface. Outside of the volume is outside.
+    /// The body that some voxels are, of which there must be one, as a closed surface. Outside of the volume is outside, and so are voxels
+    /// that are not a number.
     ///
     /// The surface of labels is that by marching tetrahedra without its steps, which tell of the voxels and not of the body: vertices
     /// move towards the middle of their neighbours again and again while the volume stays that of the voxels, but each stays
@@ -135,12 +140,33 @@ impl Volume {
         let depth = match inside {
             Inside::Label(_) if inside.holds(value) => 0.5,
             Inside::Label(_) => -0.5,
+            Inside::Above(threshold) if value.is_nan() => {
+                self.depth_without_number(nearest, threshold)
+            }
             Inside::Above(threshold) => value - threshold,
         };
         if nearest == voxel {
             depth
         } else {
             -depth.abs()
+        }
+    }
+
+    /// The depth of a voxel that is not a number: the surface is half-way between it and those inside around it, as at the side of the volume.
+    fn depth_without_number(&self, voxel: [isize; 3], threshold: f64) -> f64 {
+        let size = self.size();
+        let around = (0..27).map(|n| [n % 3, n / 3 % 3, n / 9]);
+        let around = around.map(|step| [0, 1, 2].map(|axis| voxel[axis] + step[axis] - 1));
+        let exist = |x: &[isize; 3]| (0..3).all(|axis| (0..size[axis] as isize).contains(&x[axis]));
+        let depths = around.filter(exist);
+        let depths = depths.map(|x| self.value(x.map(|i| i as usize)) - threshold);
+        let inside = depths.filter(|&depth| depth > 0.0);
+        let (sum, count) = inside.fold((0.0, 0), |(sum, n), depth| (sum + depth, n + 1));
+        // Without any of them, nothing depends on how far outside it is.
+        if count == 0 {
+            -1.0
+        } else {
+            -sum / f64::from(count)
         }
     }
 

@@ -37,7 +37,8 @@ pub enum Error {
 #[non_exhaustive]
 pub enum FormatError {
     #[error(
-        "it begins with the bytes {start:02x?}, and is none of NIfTI (.nii, .nii.gz), MRC (.mrc, .map) and stacks of TIFF images"
+        "it begins with the bytes {start:02x?}, and is none of NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MGH (.mgh, .mgz), MRC (.mrc, .map), \
+         stacks of TIFF images and NPY"
     )]
     Unknown { start: Vec<u8> },
     #[error("{entry} of the {format} header is {value}; it must be {requirement}")]
@@ -62,8 +63,18 @@ pub enum FormatError {
         bytes: u64,
         limit: u64,
     },
-    #[error("voxel {index:?} has the value {value}; all values must be finite")]
-    NonFinite { index: [usize; 3], value: f64 },
+    #[error(
+        "voxel {index:?} has the value {value}; values must be finite, or NaN outside of a body"
+    )]
+    Infinite { index: [usize; 3], value: f64 },
+    #[error("no voxel has a value: all are NaN")]
+    NoValues,
+    #[error("it holds {count} volumes, such as those of several times: give `frame` N of one of them, from 0 to {}", count - 1)]
+    SeveralFrames { count: u64 },
+    #[error("there is no `frame` {frame}: it holds {count} {}", if *count == 1 { "volume: leave it out".to_owned() } else { format!("volumes, from 0 to {}", count - 1) })]
+    NoFrame { frame: u64, count: u64 },
+    #[error(transparent)]
+    Npy(#[from] geometry::npy::NpyError),
     #[error("damaged, truncated or unusual {format}: {message}")]
     Damaged {
         format: &'static str,

@@ -53,10 +53,12 @@ mod body;
 mod error;
 mod read;
 mod volume;
+mod warning;
 mod write;
 
 pub use body::{Body, Inside};
 pub use error::{Error, FormatError};
-pub use read::{decode, is_stack, read};
+pub use read::{decode, decode_frame, holds_stack, is_stack, read, read_frame};
 pub use volume::{Values, Volume};
+pub use warning::Warning;
 pub use write::write;

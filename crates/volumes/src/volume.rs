@@ -4,7 +4,7 @@ use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
-use crate::{Error, FormatError};
+use crate::{Error, FormatError, Warning};
 
 /// One number per voxel of a lattice of `size[0] x size[1] x size[2]` voxels, whose centres are at `origin + i a + j b + k c`.
 ///
@@ -15,6 +15,7 @@ pub struct Volume {
     /// From coordinates in voxels to positions.
     pub(crate) frame: DAffine3,
     voxels: Voxels,
+    pub(crate) warnings: Vec<Warning>,
 }
 
 /// Numbers as they are in files, the first axis fastest.
@@ -28,6 +29,11 @@ pub(crate) struct Voxels {
 }
 
 impl Voxels {
+    /// Whether they are whole numbers that a scale may turn into others.
+    fn are_scaled(&self) -> bool {
+        self.element.is_integer() && !self.scale.iter().all(|number| number.fract() == 0.0)
+    }
+
     fn value(&self, voxel: usize) -> f64 {
         let size = self.element.size();
         let bytes = &self.bytes[size * voxel..][..size];
@@ -94,8 +100,8 @@ impl Volume {
     /// next along axis `i`, and its last column is the centre of the first voxel, as in NIfTI.
     ///
     /// # Errors
-    /// [`Error::Volume`]: fewer than two voxels along an axis, another number of values, values that are not finite, and an affine map that
-    /// has no inverse.
+    /// [`Error::Volume`]: fewer than two voxels along an axis, another number of values, infinite values, no values but NaN, and an affine
+    /// map that has no inverse.
     pub fn of_values(
         size: [usize; 3],
         affine: [[f64; 4]; 3],
@@ -138,21 +144,39 @@ impl Volume {
                 requirement: "a finite affine map that can be inverted",
             });
         }
-        let volume = Self {
+        let mut volume = Self {
             size,
             frame,
             voxels,
+            warnings: Vec::new(),
         };
-        let bad = (0..volume.len())
-            .into_par_iter()
-            .find_first(|&voxel| !volume.voxels.value(voxel).is_finite());
-        match bad {
-            None => Ok(volume),
-            Some(voxel) => Err(FormatError::NonFinite {
-                index: volume.index(voxel),
-                value: volume.voxels.value(voxel),
-            }),
+        volume.check_values()?;
+        Ok(volume)
+    }
+
+    /// Refuses infinite values, and counts those that are not a number.
+    fn check_values(&mut self) -> Result<(), FormatError> {
+        let voxels = || (0..self.len()).into_par_iter();
+        let value = |voxel: usize| self.voxels.value(voxel);
+        if let Some(voxel) = voxels().find_first(|&voxel| value(voxel).is_infinite()) {
+            return Err(FormatError::Infinite {
+                index: self.index(voxel),
+                value: value(voxel),
+            });
         }
+        let count = voxels().filter(|&voxel| value(voxel).is_nan()).count();
+        if count == self.len() {
+            return Err(FormatError::NoValues);
+        }
+        if count > 0 {
+            self.warnings.push(Warning::NoNumbers { count });
+        }
+        Ok(())
+    }
+
+    /// What a person should know before trusting the volume.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 
     /// Voxels along the axes.
@@ -171,9 +195,19 @@ impl Volume {
         self.voxels.value(i + self.size[0] * (j + self.size[1] * k))
     }
 
-    /// All values, the first axis fastest.
+    /// All values, the first axis fastest; NaN outside of a mask.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).map(|voxel| self.voxels.value(voxel))
+    }
+
+    /// The whole number that a value is, up to the rounding of the scale of whole numbers; others are themselves.
+    pub(crate) fn rounded(&self, value: f64) -> f64 {
+        let whole = value.round();
+        if self.voxels.are_scaled() && (value - whole).abs() <= label_tolerance(whole) {
+            whole
+        } else {
+            value
+        }
     }
 
     /// Where a point is whose coordinates are counted in voxels from the centre of the first one.
@@ -191,4 +225,9 @@ impl Volume {
         let [x, y, _] = self.size;
         [voxel % x, voxel / x % y, voxel / (x * y)]
     }
+}
+
+/// How far the value of a voxel may be from a label: scaled values are rounded, and neighbours of large labels are others.
+pub(crate) fn label_tolerance(label: f64) -> f64 {
+    (1e-6 * label.abs()).clamp(1e-6, 0.4)
 }

@@ -1,12 +1,14 @@
 //! Volumes of all formats.
 
+use std::borrow::Cow;
 use std::io::{Cursor, Write};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use tiff::encoder::colortype::{Gray8, Gray16, Gray32Float};
-use tiff::encoder::{Rational, TiffEncoder};
-use tiff::tags::{ResolutionUnit, Tag};
+use tiff::encoder::{Rational, TiffEncoder, TiffValue};
+use tiff::tags::{ResolutionUnit, Tag, Type};
+use volumes::Volume;
 
 /// Voxels of the volumes here.
 pub const SIZE: [usize; 3] = [5, 4, 3];
@@ -20,6 +22,33 @@ pub const ROWS: [[f32; 4]; 3] = [
 /// Different values, the first axis fastest.
 pub fn values() -> Vec<u8> {
     (0..SIZE.iter().product::<usize>() as u8).collect()
+}
+
+pub fn assert_values(volume: &Volume, name: &str) {
+    assert_eq!(volume.size(), SIZE, "{name}");
+    let found: Vec<f64> = volume.values().collect();
+    let expected: Vec<f64> = values().into_iter().map(f64::from).collect();
+    assert!(found == expected, "{name}: {found:?}");
+    assert!((volume.value([4, 3, 2]) - 59.0).abs() < 1e-12, "{name}");
+}
+
+pub fn assert_near(found: [f64; 3], expected: [f64; 3]) {
+    let close = found
+        .iter()
+        .zip(expected)
+        .all(|(a, b)| (a - b).abs() < 1e-6);
+    assert!(close, "{found:?} {expected:?}");
+}
+
+/// Where the rows put the voxels.
+pub fn assert_place(volume: &Volume) {
+    let index = [1.0, 2.0, 3.0];
+    let place = ROWS.map(|row| {
+        let terms = (0..3).map(|axis| f64::from(row[axis]) * index[axis]);
+        terms.sum::<f64>() + f64::from(row[3])
+    });
+    assert_near(volume.position(index), place);
+    assert!((volume.voxel_volume() - 9.0).abs() < 1e-6);
 }
 
 /// Bytes that are put into a header in either order.
@@ -79,6 +108,28 @@ pub fn nifti_2(big_endian: bool, voxels: &[u8]) -> Vec<u8> {
     [&header.bytes, voxels].concat()
 }
 
+/// With these fields, a comment, a note and the voxels.
+pub fn nrrd(fields: &str, voxels: &[u8]) -> Vec<u8> {
+    let head = format!("NRRD0004\n# of a test\n{fields}\nan organ:=the heart: a muscle\n\n");
+    [head.as_bytes(), voxels].concat()
+}
+
+/// With the voxels in the type of that number; turned, of 2 x 3 x 4, with the centre at (1, -2, 5).
+pub fn mgh(data_type: i32, frames: i32, voxels: &[u8]) -> Vec<u8> {
+    let mut header = Header::new(284, true);
+    for (place, n) in [1, 5, 4, 3, frames, data_type].into_iter().enumerate() {
+        header.put(4 * place, n.to_le_bytes());
+    }
+    header.put(28, 1_i16.to_le_bytes());
+    let directions = [0.0, 0.6, 0.8, -1.0, 0.0, 0.0, 0.0, -0.8, 0.6];
+    let numbers = [[2.0, 3.0, 4.0], [1.0, -2.0, 5.0_f32]];
+    let numbers = numbers[0].iter().chain(&directions).chain(&numbers[1]);
+    for (place, number) in numbers.enumerate() {
+        header.put(30 + 4 * place, number.to_le_bytes());
+    }
+    [&header.bytes, voxels].concat()
+}
+
 /// Voxels of 2 x 3 x 0.5, whose columns are along z and sections along x.
 pub fn mrc(mode: i32, big_endian: bool, voxels: &[u8]) -> Vec<u8> {
     let mut header = Header::new(1024, big_endian);
@@ -103,19 +154,52 @@ pub fn mrc(mode: i32, big_endian: bool, voxels: &[u8]) -> Vec<u8> {
 
 /// As ImageJ writes it, with pixels of 0.5 x 0.25 and pages at a distance of 2.
 pub fn stack(description: &str) -> Vec<u8> {
+    let all = values();
+    let all: Vec<Vec<u8>> = all.chunks(SIZE[0] * SIZE[1]).map(<[u8]>::to_vec).collect();
+    pages([SIZE[0] as u32, SIZE[1] as u32], description, &all)
+}
+
+/// Pages of this width and height.
+pub fn pages([width, height]: [u32; 2], description: &str, all: &[Vec<u8>]) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut file).unwrap();
-    for page in values().chunks(SIZE[0] * SIZE[1]) {
-        let [width, height] = [SIZE[0], SIZE[1]].map(|n| n as u32);
+    for page in all {
         let mut image = encoder.new_image::<Gray8>(width, height).unwrap();
         image.resolution_unit(ResolutionUnit::None);
         image.x_resolution(Rational { n: 2, d: 1 });
         image.y_resolution(Rational { n: 4, d: 1 });
+        // The crate writes ASCII only, and OME-TIFF has UTF-8.
+        let bytes = [description.as_bytes(), &[0]].concat();
         let tags = image.encoder();
-        tags.write_tag(Tag::ImageDescription, description).unwrap();
+        tags.write_tag(Tag::ImageDescription, Text(&bytes)).unwrap();
         image.write_data(page).unwrap();
     }
     file.into_inner()
+}
+
+/// A text that ends with zero.
+struct Text<'a>(&'a [u8]);
+
+impl TiffValue for Text<'_> {
+    const BYTE_LEN: u8 = 1;
+    const FIELD_TYPE: Type = Type::ASCII;
+
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn data(&self) -> Cow<'_, [u8]> {
+        Cow::Borrowed(self.0)
+    }
+}
+
+/// An array of `NumPy`.
+pub fn npy(data_type: &str, fortran_order: bool, shape: &str, data: &[u8]) -> Vec<u8> {
+    let order = if fortran_order { "True" } else { "False" };
+    let header =
+        format!("{{'descr': '{data_type}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
+    let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), data].concat()
 }
 
 /// A stack whose pages have another tag or value in place of a tag with one short number.

@@ -3,24 +3,9 @@
 use volumes::{Error, FormatError, Inside, Volume, decode, is_stack, read, write};
 
 use crate::common::{
-    Header, ROWS, SIZE, mrc, nifti, nifti_2, packed, retagged, stack, values, wide_stacks,
+    Header, SIZE, assert_near, assert_place, assert_values, mrc, nifti, nifti_2, packed, retagged,
+    stack, values, wide_stacks,
 };
-
-fn assert_values(volume: &Volume, name: &str) {
-    assert_eq!(volume.size(), SIZE, "{name}");
-    let found: Vec<f64> = volume.values().collect();
-    let expected: Vec<f64> = values().into_iter().map(f64::from).collect();
-    assert!(found == expected, "{name}: {found:?}");
-    assert!((volume.value([4, 3, 2]) - 59.0).abs() < 1e-12, "{name}");
-}
-
-fn assert_near(found: [f64; 3], expected: [f64; 3]) {
-    let close = found
-        .iter()
-        .zip(expected)
-        .all(|(a, b)| (a - b).abs() < 1e-6);
-    assert!(close, "{found:?} {expected:?}");
-}
 
 fn with_white_as_zero(stack: &[u8]) -> Vec<u8> {
     retagged(stack, [262, 1], [262, 0])
@@ -72,16 +57,10 @@ fn nifti_of_all_kinds() {
         ("version 2, big-endian", nifti_2(true, &values())),
         ("compressed", packed(&nifti(2, false, &values()))),
     ];
-    let index = [1.0, 2.0, 3.0];
-    let place = ROWS.map(|row| {
-        let terms = (0..3).map(|axis| f64::from(row[axis]) * index[axis]);
-        terms.sum::<f64>() + f64::from(row[3])
-    });
     for (name, bytes) in files {
         let volume = decode(&bytes).unwrap();
         assert_values(&volume, name);
-        assert_near(volume.position(index), place);
-        assert!((volume.voxel_volume() - 9.0).abs() < 1e-6);
+        assert_place(&volume);
     }
 }
 
@@ -244,7 +223,7 @@ fn bad_files_are_refused_with_numbers() {
         file[at..at + bytes.len()].copy_from_slice(bytes);
         file
     };
-    let nan = |v: u8| f32::to_le_bytes(if v == 27 { f32::NAN } else { 1.0 });
+    let infinite = |v: u8| f32::to_le_bytes(if v == 27 { -f32::INFINITY } else { 1.0 });
     let cut = |file: &[u8], by: usize| file[..file.len() - by].to_vec();
     for (bytes, part) in [
         (b"nothing here".to_vec(), "none of NIfTI"),
@@ -260,7 +239,7 @@ fn bad_files_are_refused_with_numbers() {
         (nifti[..200].to_vec(), "should have 348 bytes"),
         (
             edited(&edited(&nifti, 40, &[4, 0]), 48, &[2, 0]),
-            "one volume",
+            "holds 2 volumes, such as those of several times: give `frame` N of one of them, from 0 to 1",
         ),
         (
             edited(&nifti, 42, &(-1_i16).to_le_bytes()),
@@ -309,21 +288,25 @@ fn bad_files_are_refused_with_numbers() {
         (packed(&cut(&nifti, 5)), "and has 407"),
         (
             packed(&[&nifti[..], &[0; 5000]].concat()),
-            "and has 1024 or more",
+            "and has 413 or more",
         ),
         (cut(&stack(""), 20), "TIFF"),
-        (stack("ImageJ=1\nimages=7\n"), "what ImageJ notes"),
+        (stack("ImageJ=1\nimages=7\n"), "what the description notes"),
         (
             stack("ImageJ=1\nimages=3\nchannels=3\n"),
-            "channels or times",
+            "save the pages as sections along z",
         ),
         (
             stack("ImageJ=1\nimages=3\ncf=3\nc0=1\nc1=2\n"),
             "calibration function of the TIFF header is 3",
         ),
         (
-            crate::common::nifti(16, false, &numbers(nan)),
-            "voxel [2, 1, 1] has the value NaN",
+            crate::common::nifti(16, false, &numbers(infinite)),
+            "voxel [2, 1, 1] has the value -inf",
+        ),
+        (
+            crate::common::nifti(16, false, &numbers(|_| f32::to_le_bytes(f32::NAN))),
+            "no voxel has a value: all are NaN",
         ),
     ] {
         let error = decode(&bytes).unwrap_err().to_string();

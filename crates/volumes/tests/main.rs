@@ -4,6 +4,9 @@ mod bodies;
 mod common;
 mod files;
 mod fuzzing;
+mod kinds;
+mod nrrd;
+mod stacks;
 
 #[global_allocator]
 static ALLOCATOR: ::fuzzing::CountingAllocator = ::fuzzing::CountingAllocator;

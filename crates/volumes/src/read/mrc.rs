@@ -6,7 +6,7 @@
 use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::{Fields, HEAD, Header, size};
+use super::{Fields, Frames, HEAD, Header, size};
 use crate::FormatError;
 
 /// Angles of cells may differ from right ones by so many degrees.
@@ -74,12 +74,15 @@ fn entries(fields: &Fields<'_>) -> Result<Header, FormatError> {
     if origin.iter().any(|x| *x != 0.0) {
         first = origin.into();
     }
+    let size = size("MRC", i32s(0))?;
     Ok(Header {
-        size: size("MRC", i32s(0))?,
+        size,
+        frames: Frames::in_turn(1, size),
         element,
         big_endian: fields.big_endian,
         scale: [1.0, 0.0],
-        frame: DAffine3::from_mat3_translation(matrix, first),
+        affine: DAffine3::from_mat3_translation(matrix, first),
         start: HEAD as u64 + extended as u64,
+        has_footer: false,
     })
 }

@@ -5,7 +5,7 @@
 use files::Number;
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::{Fields, Header, size};
+use super::{Fields, Frames, Header, size};
 use crate::FormatError;
 
 /// Lengths of the headers, which are their first numbers.
@@ -42,12 +42,13 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
     }
     let dimensions: [f64; 8] = fields.numbers(at(40, 16), whole);
     let [axes, nx, ny, nz, more @ ..] = dimensions;
-    // Axes beyond those that are counted say nothing.
-    let several = |n: &usize| more[*n] > 1.0 && (*n as f64) < axes - 3.0;
-    if !(3.0..=7.0).contains(&axes) || (0..4).any(|n| several(&n)) {
+    if !(3.0..=7.0).contains(&axes) {
         let shown = format!("{:?}", dimensions.map(|n| n as i64));
-        return bad("dim", &shown, "that of one volume with three axes");
+        return bad("dim", &shown, "that of a volume with three axes or more");
     }
+    // Axes beyond those that are counted say nothing.
+    let more = more[..axes as usize - 3].iter().map(|n| n.max(1.0) as u64);
+    let frames = more.fold(1, u64::saturating_mul);
     let element = match fields.number(at(70, 12), I16) as i16 {
         2 => Number::U8,
         4 => I16,
@@ -72,18 +73,21 @@ fn entries(fields: &Fields<'_>, is_first: bool) -> Result<Header, FormatError> {
         [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
         [slope, shift] => return bad("scl_slope", &format!("{slope} {shift}"), "finite"),
     };
+    let size = size("NIfTI", [nx, ny, nz])?;
     Ok(Header {
-        size: size("NIfTI", [nx, ny, nz])?,
+        size,
+        frames: Frames::in_turn(frames, size),
         element,
         big_endian: fields.big_endian,
         scale,
-        frame: frame(fields, at, [code, real]),
+        affine: affine(fields, at, [code, real]),
         start: start as u64,
+        has_footer: false,
     })
 }
 
 /// The map from indices to positions, by rows, by a quaternion, or by the sides of voxels; `at` tells places in the headers of both versions.
-fn frame(
+fn affine(
     fields: &Fields<'_>,
     at: impl Fn(usize, usize) -> usize,
     [code, real]: [Number; 2],
