@@ -70,6 +70,16 @@ pub enum FormatError {
     UnknownFormat { start: Vec<u8> },
     #[error("it has {} x {} pixels, and may have 1 to {LARGEST_IMAGE}; make it smaller", _0[0], _0[1])]
     Size([u32; 2]),
+    #[error(
+        "its {} x {} pixels take {bytes} bytes, twice as many while they are decoded, and there may be {}; save it with 8 or 16 bits for a value, \
+         or make it smaller",
+        size[0], size[1], 24 * LARGEST_IMAGE
+    )]
+    Deep {
+        size: [u32; 2],
+        /// Bytes of all pixels.
+        bytes: u64,
+    },
     /// What the library of the format says.
     #[error("damaged, truncated or unusual {format}: {message}; try saving it as PNG")]
     Damaged {

@@ -14,8 +14,10 @@ use crate::image::pixels;
 use crate::limits::{LARGEST_FILE, LARGEST_IMAGE};
 use crate::{Error, FormatError, Image};
 
-/// Most bytes for each pixel while decoding.
+/// Most bytes for each pixel of a decoded image,
 const DEEPEST: u64 = 16;
+/// and most bytes while decoding.
+const MOST_BYTES: u64 = 24 * LARGEST_IMAGE as u64;
 
 /// Reads an image, of a format that is told by its first bytes and not by its extension.
 ///
@@ -28,9 +30,9 @@ const DEEPEST: u64 = 16;
 /// Colours become grey by the luma of JPEG, `0.299 R + 0.587 G + 0.114 B` of the stored values.
 /// Colour profiles are passed over. Images that Exif says are turned or mirrored are set upright.
 ///
-/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 24 bytes each while decoding; beside
+/// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 24 bytes for each of so many while decoding; beside
 /// them four times the size of the file, which is at most eight bytes for each of these pixels, and
-/// 32 MiB. The size is checked before anything is decoded.
+/// 32 MiB. The size is checked before anything is decoded, and of TIFF with colours and opacities in floats there may be three quarters of the pixels.
 pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
     let path = path.as_ref();
     let io = |source| files::Error::of("read", path)(source);
@@ -120,7 +122,18 @@ fn other(
     limits.max_alloc = Some(DEEPEST * LARGEST_IMAGE as u64);
     reader.limits(limits);
     let mut decoder = reader.into_decoder().map_err(refused)?;
-    checked(decoder.dimensions().into())?;
+    let size = decoder.dimensions().into();
+    checked(size)?;
+    if format == "TIFF" {
+        // The decoder has a buffer as large as the image beside it.
+        let bytes = decoder.total_bytes();
+        if 2 * bytes > MOST_BYTES {
+            return Err(FormatError::Deep { size, bytes });
+        }
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MOST_BYTES - bytes);
+        decoder.set_limits(limits).map_err(refused)?;
+    }
     let orientation = decoder.orientation().map_err(refused)?;
     let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
     Ok((image, Some(orientation)))

@@ -272,3 +272,58 @@ fn errors_can_be_matched() {
         })
     );
 }
+
+/// A TIFF file of colours and opacities as floats, with its pixels in one strip; those of a large one need not be there.
+fn deep_tiff([width, height]: [u32; 2], pixels: &[f32]) -> Vec<u8> {
+    let entries: [[u32; 4]; 10] = [
+        [256, 4, 1, width],
+        [257, 4, 1, height],
+        [258, 3, 4, 134],
+        [259, 3, 1, 1],
+        [262, 3, 1, 2],
+        [273, 4, 1, 150],
+        [277, 3, 1, 4],
+        [278, 4, 1, height],
+        [279, 4, 1, 16 * width * height],
+        [339, 3, 4, 142],
+    ];
+    let mut file = b"II*\0\x08\0\0\0\x0a\0".to_vec();
+    for [tag, kind, count, value] in entries {
+        file.extend(
+            [tag as u16, kind as u16]
+                .iter()
+                .flat_map(|n| n.to_le_bytes()),
+        );
+        file.extend([count, value].iter().flat_map(|n| n.to_le_bytes()));
+    }
+    file.extend([0; 4]);
+    file.extend(
+        [32_u16, 32, 32, 32, 3, 3, 3, 3]
+            .iter()
+            .flat_map(|n| n.to_le_bytes()),
+    );
+    file.extend(pixels.iter().flat_map(|v| v.to_le_bytes()));
+    file
+}
+
+/// They would need 32 bytes a pixel while they are decoded.
+#[test]
+fn deep_images_are_refused_before_they_take_memory() {
+    let pixels = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0].repeat(6);
+    let image = decode(&deep_tiff([4, 3], &pixels)).unwrap();
+    assert_eq!(image.size(), [4, 3]);
+    assert_eq!(image.grey()[..4], [0, 65535, 0, 65535]);
+    let (result, peak) = fuzzing::peak_of(|| decode(&deep_tiff([8128, 8128], &[])));
+    let Err(error @ FormatError::Deep { .. }) = result else {
+        panic!("{result:?}");
+    };
+    assert!(
+        error.to_string().contains("save it with 8 or 16 bits"),
+        "{error}"
+    );
+    fuzzing::assert_short_line(&error);
+    assert!(peak < 1 << 20, "{peak}");
+    // Three quarters of the most pixels are not too many.
+    let error = decode(&deep_tiff([8192, 6144], &[])).unwrap_err();
+    assert!(matches!(error, FormatError::Damaged { .. }), "{error}");
+}
