@@ -103,7 +103,7 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBu
 
 /// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.
 fn kind(bytes: &[u8]) -> &'static str {
-    const BEGINNINGS: [(&[u8], &str); 19] = [
+    const BEGINNINGS: [(&[u8], &str); 21] = [
         (b"ply", "ply"),
         (b"solid", "stl"),
         (b"\x89PNG", "png"),
@@ -121,6 +121,8 @@ fn kind(bytes: &[u8]) -> &'static str {
         (b"\x1c\x02\0\0", "nii"),
         (b"\0\0\x01\x5c", "nii"),
         (b"\0\0\x02\x1c", "nii"),
+        (b"NRRD000", "nrrd"),
+        (b"\0\0\0\x01", "mgh"),
         (b"<?xml", "vti"),
         (b"<VTKFile", "vti"),
     ];

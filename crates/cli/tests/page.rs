@@ -100,10 +100,7 @@ fn a_run_that_is_not_finished_shows_its_surface() {
     let html = page(folder.path(), "run");
     assert!(html.contains("Not finished: 1 step"));
     for label in ["before", "step 1"] {
-        assert!(
-            html.contains(&format!("data-label=\"{label}\"")),
-            "{label}"
-        );
+        assert!(html.contains(&format!("data-label=\"{label}\"")), "{label}");
     }
 }
 

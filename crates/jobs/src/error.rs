@@ -25,8 +25,8 @@ pub enum Error {
     ParaView(String),
     /// Something that no job takes.
     #[error(
-        "{0} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume (.nii, .nii.gz, .mrc, .map, .tif of \
-         several pages), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
+        "{0} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume (.nii, .nii.gz, .nrrd, .nhdr, \
+         .mgh, .mgz, .mrc, .map, .tif of several pages, .npy of labels), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
     )]
     UnknownInput(String),
     /// An option that says nothing about the input, or in this dimension.
@@ -138,6 +138,21 @@ pub enum Error {
         /// The value.
         value: f64,
     },
+    /// Values of which none is that of the outside in a phase field.
+    #[error(
+        "{} holds values from {low} to {high}, and a phase field goes from -1 outside to 1 inside: {}, or `field_kind` if it is a field all the same",
+        path.display(), not_a_field(*dimension)
+    )]
+    NoneOutside {
+        /// The file.
+        path: PathBuf,
+        /// The lowest value.
+        low: f64,
+        /// The highest one.
+        high: f64,
+        /// The dimension of the array.
+        dimension: usize,
+    },
     /// A shape of which there is nothing on the grid, or nothing else.
     #[error(
         "{input} has {inside} of {nodes} nodes inside, so that there is nothing to move: use more `cells`, or another size"
@@ -242,6 +257,15 @@ pub enum Error {
     /// From segmentations.
     #[error(transparent)]
     Volumes(#[from] volumes::Error),
+}
+
+/// What values are that no phase field has.
+fn not_a_field(dimension: usize) -> &'static str {
+    if dimension == 2 {
+        "save a mask as an image (.png)"
+    } else {
+        "give `threshold` VALUE to read it as a volume, whose larger values are inside"
+    }
 }
 
 /// What helps against losses.

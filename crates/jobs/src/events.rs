@@ -72,6 +72,13 @@ pub enum Warning {
         /// What was done.
         changes: surfaces::RepairChanges,
     },
+    /// A volume has voxels without a value, or not all that is needed to place it.
+    Volume {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        warning: volumes::Warning,
+    },
     /// Parts or holes are lost on the grid.
     Lost(Loss),
     /// A part of the boundary is at parts or gaps that are thin for the interface.
@@ -224,6 +231,7 @@ impl fmt::Display for Warning {
                 write!(f, "{}: {change}{only}", path.display())
             }
             Self::Repaired { path, changes } => write!(f, "{}: {changes}", path.display()),
+            Self::Volume { path, warning } => write!(f, "{}: {warning}", path.display()),
             Self::Lost(loss) => loss.fmt(f),
             Self::Thin(thin) => thin.fmt(f),
             Self::SignsMended { nodes } => write!(
@@ -286,6 +294,11 @@ pub enum Note {
         /// Cells per unit length.
         cells: usize,
     },
+    /// An array of 0 and 1 is taken for a volume of labels.
+    Mask {
+        /// The file.
+        path: PathBuf,
+    },
     /// Edges sharper than the interface became round.
     RoundEdges {
         /// Whether it is a curve, whose length it is about, and not a surface with an area.
@@ -341,6 +354,11 @@ impl fmt::Display for Note {
             Self::CoarserThanVoxels { voxels, cells } => write!(
                 f,
                 "a cell is {voxels:.1} voxels wide: with more `cells` than {cells} smaller details last"
+            ),
+            Self::Mask { path } => write!(
+                f,
+                "{} holds 0 and 1: it is read as a mask, in voxels of side 1, and not as a phase field, which goes from -1 to 1",
+                path.display()
             ),
             Self::RoundEdges {
                 is_curve,

@@ -6,7 +6,7 @@ use std::convert::Infallible;
 use std::fmt;
 use std::sync::Arc;
 
-use geometry::npy::NpyError;
+use geometry::npy::Array;
 use volumes::Volume;
 
 use crate::prelude::*;
@@ -214,19 +214,52 @@ impl File {
         Ok(surfaces::up_axis_of(&self.read()?, &self.path)?)
     }
 
-    /// The volume in it.
-    pub fn volume(&self) -> Result<Cow<'_, Volume>> {
-        Ok(match &self.contents {
-            None => Cow::Owned(volumes::read(&self.path)?),
-            Some(Contents::Volume(volume)) => Cow::Borrowed(volume),
-            Some(_) => {
-                let decoded = volumes::decode(&self.read()?);
-                Cow::Owned(decoded.map_err(|problem| volumes::Error::Format {
-                    path: self.path.clone(),
-                    problem,
-                })?)
+    /// The volume in it; of several that with this number.
+    pub fn volume(&self, frame: Option<u64>) -> Result<Cow<'_, Volume>> {
+        let of_file = |problem| volumes::Error::Format {
+            path: self.path.clone(),
+            problem,
+        };
+        Ok(match (&self.contents, frame) {
+            (None, _) => Cow::Owned(volumes::read_frame(&self.path, frame)?),
+            (Some(Contents::Volume(volume)), None | Some(0)) => Cow::Borrowed(volume),
+            (Some(Contents::Volume(_)), Some(frame)) => {
+                let problem = volumes::FormatError::NoFrame { frame, count: 1 };
+                return Err(of_file(problem).into());
+            }
+            (Some(_), _) => {
+                let decoded = volumes::decode_frame(&self.read()?, frame);
+                Cow::Owned(decoded.map_err(of_file)?)
             }
         })
+    }
+
+    /// What an array in it says, unless it is none.
+    fn of_array<T>(&self, say: impl FnOnce(&Array<'_>) -> T) -> Result<Option<T>> {
+        match &self.contents {
+            None | Some(Contents::Bytes(_)) => {
+                Ok(Array::of(&self.read()?).ok().map(|array| say(&array)))
+            }
+            Some(_) => Ok(None),
+        }
+    }
+
+    /// The number of axes of an array of whole numbers, which are labels.
+    pub fn axes_of_labels(&self) -> Result<Option<usize>> {
+        let axes = |array: &Array<'_>| array.number.is_integer().then_some(array.shape.len());
+        Ok(self.of_array(axes)?.flatten())
+    }
+
+    /// Whether it is an array of values in space.
+    pub fn has_values_in_space(&self) -> Result<bool> {
+        let is_in_space = |array: &Array<'_>| array.shape.len() == 3;
+        Ok(self.of_array(is_in_space)?.unwrap_or(false))
+    }
+
+    /// Whether all values of an array are 0 and 1, which are those of a mask and not of a phase field.
+    pub fn is_mask(&self) -> Result<bool> {
+        let is_mask = |array: &Array<'_>| array.values().all(|v| [0.0, 1.0].contains(&v));
+        Ok(self.of_array(is_mask)?.unwrap_or(false))
     }
 
     /// Whether it is a field in the plane. Whatever else is wrong with a file is said when its values are read.
@@ -234,10 +267,9 @@ impl File {
         Ok(match &self.contents {
             Some(Contents::Plane(_)) => true,
             Some(Contents::Space(_)) => false,
-            _ => {
-                let decoded = npy::decode::<2>(&self.read()?);
-                !matches!(decoded, Err(NpyError::Rank { .. }))
-            }
+            _ => self
+                .of_array(|array| array.shape.len() == 2)?
+                .unwrap_or(true),
         })
     }
 
@@ -259,7 +291,7 @@ impl File {
         match &self.contents {
             None => volumes::is_stack(&self.path),
             // A single image is no volume.
-            Some(Contents::Bytes(bytes)) => volumes::decode(bytes).is_ok(),
+            Some(Contents::Bytes(bytes)) => volumes::holds_stack(bytes),
             Some(_) => true,
         }
     }

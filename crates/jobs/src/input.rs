@@ -103,6 +103,8 @@ const MOST_RAYS: usize = 4096;
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
+/// Phase fields have values below this one: they are -1 outside.
+const OUTSIDE: f64 = -0.5;
 /// Largest magnitude in a phase field: flows overshoot the phases a little.
 const LARGEST_PHASE: f64 = 1.1;
 
@@ -162,11 +164,34 @@ impl Source {
             "obj" | "stl" | "ply" => Self::Mesh(file),
             "tif" | "tiff" if file.is_stack() => Self::Volume(file),
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(file),
-            "npy" => Self::Field(file),
+            "npy" => match file.axes_of_labels()? {
+                None => Self::Field(file),
+                Some(2) => return Err(Refusal::LabelsInThePlane(file.path).into()),
+                Some(_) => Self::Volume(file),
+            },
             "vti" => return Err(Error::ParaView(name.to_owned())),
-            "nii" | "gz" | "mrc" | "map" => Self::Volume(file),
+            "nii" | "gz" | "nrrd" | "nhdr" | "mgh" | "mgz" | "mrc" | "map" => Self::Volume(file),
             _ => return Err(Error::UnknownInput(name.to_owned())),
         })
+    }
+
+    /// An array of values in space is a volume if the options say so, or if it is a mask of 0 and 1.
+    fn meant(self, options: &InputOptions, watcher: &dyn Watcher) -> Result<Self> {
+        let Self::Field(file) = &self else {
+            return Ok(self);
+        };
+        if options.field_kind.is_some() || !file.has_values_in_space()? {
+            return Ok(self);
+        }
+        if options.threshold.is_some() || options.label.is_some() {
+            return Ok(Self::Volume(file.clone()));
+        }
+        if !file.is_mask()? {
+            return Ok(self);
+        }
+        let path = file.path.clone();
+        watcher.note(&Note::Mask { path });
+        Ok(Self::Volume(file.clone()))
     }
 
     fn file(&self) -> Option<&File> {
@@ -197,8 +222,11 @@ impl Source {
                 stem.unwrap_or_default().to_string_lossy()
             }
         };
-        // Of .nii.gz.
-        let stem = stem.strip_suffix(".nii").unwrap_or(&stem);
+        // Of .nii.gz and .ome.tif.
+        let first = [".nii", ".ome"]
+            .iter()
+            .find_map(|end| stem.strip_suffix(end));
+        let stem = first.unwrap_or(&stem);
         let other = |c: char| !(c.is_ascii_alphanumeric() || "-_".contains(c));
         stem.replace(other, "_")
     }
@@ -209,7 +237,7 @@ impl Source {
             Self::Mesh(_) => ("a mesh", &["repair", "side_length"]),
             Self::Image(_) => ("an image", &["inside", "threshold", "side_length"]),
             Self::Field(_) => ("a field", &["field_kind"]),
-            Self::Volume(_) => ("a volume", &["threshold", "label", "side_length"]),
+            Self::Volume(_) => ("a volume", &["threshold", "label", "frame", "side_length"]),
             Self::BuiltIn(_) => ("a built-in shape", &["side_length"]),
             Self::Region(_) => ("a region", &[]),
         };
@@ -217,6 +245,7 @@ impl Source {
             ("inside", options.inside.is_some()),
             ("threshold", options.threshold.is_some()),
             ("label", options.label.is_some()),
+            ("frame", options.frame.is_some()),
             ("field_kind", options.field_kind.is_some()),
             ("repair", options.repair),
             ("side_length", options.side_length.is_some()),
@@ -258,7 +287,7 @@ impl<'a> Reader<'a> {
         let Some(input) = &options.input else {
             return Err(Error::NoInput);
         };
-        let source = Source::of(input)?;
+        let source = Source::of(input)?.meant(options, watcher)?;
         source.refuse_foreign(options)?;
         if let (Some(file), Some(input)) = (source.file(), &mut options.input) {
             input.rename(&file.path);
@@ -596,7 +625,7 @@ impl<'a> Reader<'a> {
     }
 
     fn volume(&mut self, file: &File) -> Result<Loaded> {
-        let body = volume::body(file, self.options)?;
+        let body = volume::body(file, self.options, self.watcher)?;
         let bounds = body.surface.bounding_box();
         let distance = MeshDistance::new(&body.surface);
         let sides = body.surface.mesh().sides(MOST_RAYS);
@@ -650,6 +679,7 @@ impl<'a> Reader<'a> {
         &mut self,
         file: &File,
     ) -> Result<InitialShape<D, O>> {
+        let is_said = self.options.field_kind.is_some();
         let kind = *self.options.field_kind.get_or_insert(FieldKind::PhaseField);
         let is_phase = kind == FieldKind::PhaseField;
         let side = *self.options.box_side.get_or_insert(usual_box::<D>().1);
@@ -662,6 +692,9 @@ impl<'a> Reader<'a> {
                 path: file.path.clone(),
                 value: *value,
             });
+        }
+        if is_phase && !is_said {
+            check_range(field.values(), D, &file.path)?;
         }
         if self.options.cells.is_some() {
             // Distances are linear across the interface, as what lies between the nodes is taken to be.
@@ -679,6 +712,22 @@ impl<'a> Reader<'a> {
         let presentation = O::of_box(field.grid())?;
         self.start(field, presentation)
     }
+}
+
+/// Refuses values none of which is outside, such as those of a mask or of an image.
+fn check_range(values: &[f64], dimension: usize, path: &Path) -> Result<()> {
+    let all = [f64::INFINITY, f64::NEG_INFINITY];
+    let range = values.iter();
+    let [low, high] = range.fold(all, |[low, high], &u| [low.min(u), high.max(u)]);
+    if low <= OUTSIDE || low >= high {
+        return Ok(());
+    }
+    Err(Error::NoneOutside {
+        path: path.to_owned(),
+        low,
+        high,
+        dimension,
+    })
 }
 
 /// How far the surface of a phase field is from a mesh.

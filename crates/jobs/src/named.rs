@@ -61,7 +61,9 @@ fn as_fields(message: &str) -> String {
     for part in parts {
         let (option, rest) = part.split_once('\'').unwrap_or((part, ""));
         let name = option.split([' ', '=']).next().unwrap_or_default();
-        text += &format!("`{}`{rest}", name.replace('-', "_"));
+        for piece in ["`", &name.replace('-', "_"), "`", rest] {
+            text += piece;
+        }
     }
     text
 }

@@ -23,8 +23,8 @@ const ADVANCED: &str = "Advanced";
 pub struct InputOptions {
     /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
     ///
-    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .mrc, .map, or .tif with
-    /// several pages. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring, cross, rectangle, sphere, cube, torus, coin,
+    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh, .mgz,
+    /// .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring, cross, rectangle, sphere, cube, torus, coin,
     /// figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is
     /// standard input.
     pub input: Option<Input>,
@@ -53,7 +53,8 @@ pub struct InputOptions {
 
     /// Value that separates inside and outside [default: 0.5 for an image]
     ///
-    /// For an image it is a grey value or an opacity from 0 to 1. For voxels it is in the units of their values, and larger values are inside.
+    /// For an image it is a grey value or an opacity from 0 to 1. For voxels it is in the units of their values, and larger values are inside. With
+    /// it, a .npy of floats in 3D is a volume.
     #[arg(long, value_name = "VALUE", help_heading = INPUT, hide_short_help = true)]
     pub threshold: Option<f64>,
 
@@ -62,6 +63,13 @@ pub struct InputOptions {
     /// With all, each label except 0 becomes a surface of its own.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
     pub label: Option<Label>,
+
+    /// Number of the volume in a file with several, counted from 0
+    ///
+    /// A file has several volumes if it is NIfTI with more than three axes, NRRD with four, MGH with several frames, or TIFF with several channels or
+    /// times. In TIFF they are counted in the order of their pages.
+    #[arg(long, value_name = "N", help_heading = INPUT, hide_short_help = true)]
+    pub frame: Option<u64>,
 
     /// Repair a mesh that is open, crosses itself, or has triangles of inconsistent orientation
     ///

@@ -172,6 +172,13 @@ pub enum Refusal {
         side: f64,
     },
 
+    /// An array of labels or of truth values in the plane.
+    #[error(
+        "{} is an array of whole numbers or bool in the plane: save it as an image (.png), of which the light or dark pixels are inside, or a \
+         phase field as float64",
+        .0.display()
+    )]
+    LabelsInThePlane(PathBuf),
     /// All labels, for a job that takes one.
     #[error("`label` all makes a surface of each label, and this job takes one: give its number")]
     AllLabels,

@@ -2,9 +2,9 @@
 
 use engine::quarter_square;
 use mean_curvature::Calibration;
-use model::{Network, Ratios};
 use model::training::least_squares::LeastSquaresParams;
 use model::training::{Checkpoint, SphereData, Training, TrainingProgress};
+use model::{Network, Ratios};
 
 use crate::case::check_eps_over_h;
 use crate::options::TrainOptions;

@@ -9,8 +9,14 @@ use crate::values::Label;
 
 const LISTED: usize = 20;
 
-pub(crate) fn body(file: &File, options: &InputOptions) -> Result<Body> {
-    let volume = file.volume()?;
+pub(crate) fn body(file: &File, options: &InputOptions, watcher: &dyn Watcher) -> Result<Body> {
+    let volume = file.volume(options.frame)?;
+    for warning in volume.warnings() {
+        watcher.warning(&Warning::Volume {
+            path: file.path.clone(),
+            warning: warning.clone(),
+        });
+    }
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
@@ -55,7 +61,7 @@ pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
         return Ok(None);
     };
     let file = input.file()?;
-    let labels = file.volume()?.labels().unwrap_or_default();
+    let labels = file.volume(options.frame)?.labels().unwrap_or_default();
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();
     if labels.is_empty() {
