@@ -252,6 +252,86 @@ fn every_label_becomes_a_surface() {
     }
 }
 
+/// An array of `NumPy` of 64 x 64 x 64 elements.
+fn write_array(path: &Path, data_type: &str, element: impl Fn([f64; 3]) -> Vec<u8>) {
+    let header =
+        format!("{{'descr': '{data_type}', 'fortran_order': False, 'shape': (64, 64, 64), }}\n");
+    let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+    let indices = (0..64 * 64 * 64_usize).map(|v| [v / (64 * 64), v / 64 % 64, v % 64]);
+    let elements = indices.flat_map(|index| element(index.map(|i| i as f64)));
+    let head = [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes()].concat();
+    std::fs::write(path, head.into_iter().chain(elements).collect::<Vec<u8>>()).unwrap();
+}
+
+/// A ball that takes 0.0440 of its box is no larger as an array of zeros and ones.
+#[test]
+fn masks_of_numpy_are_volumes() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |x| ball(x, [31.5; 3], 14.0);
+    let at = |name: &str| folder.path().join(name);
+    write_array(&at("bool.npy"), "|b1", |x| vec![u8::from(inside(x))]);
+    write_array(&at("float.npy"), "<f8", |x| {
+        f64::from(u8::from(inside(x))).to_le_bytes().to_vec()
+    });
+    let grey = |x: [f64; 3]| {
+        let squares: f64 = x.iter().map(|x| (x - 31.5).powi(2)).sum();
+        (-squares / 196.0).exp()
+    };
+    write_array(&at("grey.npy"), "<f8", |x| grey(x).to_le_bytes().to_vec());
+    let threshold = (-1_f64).exp().to_string();
+    for (name, more, is_told) in [
+        ("bool.npy", &[][..], false),
+        ("float.npy", &[], true),
+        ("grey.npy", &["--threshold", &threshold], false),
+    ] {
+        let sample = ["sample", name, "--save", "ball.ply", "--force"];
+        let mut command = program(folder.path());
+        let output = command.args(sample).args(more).output().unwrap();
+        let told = text(&output.stderr);
+        assert!(output.status.success(), "{told}");
+        assert_eq!(told.contains("it is read as a mask"), is_told, "{told}");
+        let part = closed(&at("ball.ply")).volume() / 64_f64.powi(3);
+        assert!((part / 0.0440 - 1.0).abs() < 0.01, "{name}: {part}");
+    }
+    let output = run(folder.path(), &["sample", "grey.npy", "--save", "grey.ply"]);
+    let error = text(&output.stderr);
+    assert!(
+        error.contains("give --threshold VALUE to read it as a volume"),
+        "{error}"
+    );
+}
+
+/// The second volume of a file, of which a part is not a number.
+#[test]
+fn frames_are_chosen_and_what_is_no_number_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = "type: float\nencoding: raw\nendian: little\ndimension: 4\nsizes: 2 38 38 38\nkinds: list domain domain domain";
+    let mut bytes = format!("NRRD0004\n{fields}\n\n").into_bytes();
+    for voxel in 0..38 * 38 * 38_usize {
+        let x = [voxel % 38, voxel / 38 % 38, voxel / (38 * 38)].map(|i| i as f64);
+        let value = if ball(x, [18.3; 3], 13.0) {
+            2.0
+        } else {
+            f32::NAN
+        };
+        bytes.extend([1.0, value].iter().flat_map(|v| v.to_le_bytes()));
+    }
+    std::fs::write(folder.path().join("two.nrrd"), bytes).unwrap();
+    let sample = [
+        "sample", "two.nrrd", "--frame", "1", "--label", "2", "--save", "two.ply",
+    ];
+    let output = run(folder.path(), &sample);
+    let told = text(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(
+        told.contains("voxels are not a number (NaN): they are outside"),
+        "{told}"
+    );
+    let expected = 4.0 / 3.0 * PI * 13_f64.powi(3);
+    let volume = closed(&folder.path().join("two.ply")).volume();
+    assert!((volume / expected - 1.0).abs() < 0.01, "{volume}");
+}
+
 /// A plate of 36 x 36 x 5 voxels on a grid whose cells are two of them wide.
 #[test]
 fn thin_labels_are_refused_unless_losses_are_allowed() {

@@ -140,7 +140,7 @@ pub enum Error {
     },
     /// Values of which none is that of the outside in a phase field.
     #[error(
-        "{} holds values from {low} to {high}, and a phase field goes from -1 outside to 1 inside: {}, or `field_kind` if it is a field all the same",
+        "{} holds values from {low:.4} to {high:.4}, and a phase field goes from -1 outside to 1 inside: {}, or `field_kind` if it is a field all the same",
         path.display(), not_a_field(*dimension)
     )]
     NoneOutside {
