@@ -4,12 +4,16 @@ use std::any::Any;
 use std::borrow::Cow;
 use std::convert::Infallible;
 use std::fmt;
+use std::io::Read;
 use std::sync::Arc;
 
 use geometry::npy::Array;
 use volumes::Volume;
 
 use crate::prelude::*;
+
+/// More bytes than the header of an array has.
+const HEAD: u64 = 1 << 14;
 
 /// The input of a job: a file, a built-in shape or a region by its name, or the contents of a file in memory.
 #[derive(Clone)]
@@ -234,14 +238,23 @@ impl File {
         })
     }
 
-    /// What an array in it says, unless it is none.
+    /// What an array in it says by its header and its first elements, unless it is none.
     fn of_array<T>(&self, say: impl FnOnce(&Array<'_>) -> T) -> Result<Option<T>> {
-        match &self.contents {
-            None | Some(Contents::Bytes(_)) => {
-                Ok(Array::of(&self.read()?).ok().map(|array| say(&array)))
-            }
-            Some(_) => Ok(None),
-        }
+        let head = match &self.contents {
+            None => Cow::Owned(self.head()?),
+            Some(Contents::Bytes(bytes)) => Cow::Borrowed(&**bytes),
+            Some(_) => return Ok(None),
+        };
+        Ok(Array::of(&head).ok().map(|array| say(&array)))
+    }
+
+    /// The first bytes on disk, of which an array has its header.
+    fn head(&self) -> Result<Vec<u8>> {
+        let io = |source| files::Error::of("read", &self.path)(source);
+        let mut head = Vec::new();
+        let file = std::fs::File::open(&self.path).map_err(io)?;
+        file.take(HEAD).read_to_end(&mut head).map_err(io)?;
+        Ok(head)
     }
 
     /// The number of axes of an array of whole numbers, which are labels.
@@ -259,7 +272,11 @@ impl File {
     /// Whether all values of an array are 0 and 1, which are those of a mask and not of a phase field.
     pub fn is_mask(&self) -> Result<bool> {
         let is_mask = |array: &Array<'_>| array.values().all(|v| [0.0, 1.0].contains(&v));
-        Ok(self.of_array(is_mask)?.unwrap_or(false))
+        // Most are told from a mask by their first elements.
+        if !self.of_array(is_mask)?.unwrap_or(false) {
+            return Ok(false);
+        }
+        Ok(Array::of(&self.read()?).is_ok_and(|array| is_mask(&array)))
     }
 
     /// Whether it is a field in the plane. Whatever else is wrong with a file is said when its values are read.
