@@ -32,7 +32,8 @@ const MOST_BYTES: u64 = 24 * LARGEST_IMAGE as u64;
 ///
 /// Memory: at most [`LARGEST_IMAGE`] pixels are read, with up to 24 bytes for each of so many while decoding; beside
 /// them four times the size of the file, which is at most eight bytes for each of these pixels, and
-/// 32 MiB. The size is checked before anything is decoded, and of TIFF with colours and opacities in floats there may be three quarters of the pixels.
+/// 32 MiB. The size is checked before anything is decoded. TIFF with colours and opacities in floats may have
+/// three quarters of these pixels.
 pub fn read(path: impl AsRef<Path>) -> Result<Image, Error> {
     let path = path.as_ref();
     let io = |source| files::Error::of("read", path)(source);

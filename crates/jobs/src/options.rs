@@ -24,9 +24,9 @@ pub struct InputOptions {
     /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
     ///
     /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh, .mgz,
-    /// .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring, cross, rectangle, sphere, cube, torus, coin,
-    /// figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is
-    /// standard input.
+    /// .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring,
+    /// cross, rectangle, sphere, cube, torus, coin, figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is
+    /// box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is standard input.
     pub input: Option<Input>,
 
     /// Cells per unit length of the box [default: depends on the input]

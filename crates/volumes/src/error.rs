@@ -71,7 +71,7 @@ pub enum FormatError {
     NoValues,
     #[error("it holds {count} volumes, such as those of several times: give `frame` N of one of them, from 0 to {}", count - 1)]
     SeveralFrames { count: u64 },
-    #[error("there is no `frame` {frame}: it holds {count} {}", if *count == 1 { "volume: leave it out".to_owned() } else { format!("volumes, from 0 to {}", count - 1) })]
+    #[error("there is no `frame` {frame}: it holds {count} {}", up_to(*count))]
     NoFrame { frame: u64, count: u64 },
     #[error(transparent)]
     Npy(#[from] geometry::npy::NpyError),
@@ -80,6 +80,14 @@ pub enum FormatError {
         format: &'static str,
         message: String,
     },
+}
+
+/// Which volumes there are.
+fn up_to(count: u64) -> String {
+    match count {
+        1 => "volume: leave it out".to_owned(),
+        _ => format!("volumes, from 0 to {}", count - 1),
+    }
 }
 
 impl FormatError {

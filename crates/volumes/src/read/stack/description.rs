@@ -50,6 +50,10 @@ impl Description {
             Some(Ok(pixels)) => pixels,
             Some(Err(problem)) => return Self::damaged(reader, problem),
         };
+        if !pixels.is_in_order {
+            let requirement = "that of DimensionOrder: save the stack anew, in one file";
+            return bad("order of the pages", &"another one", requirement);
+        }
         let other = Self::other(reader)?;
         Ok(Self {
             planes: Some(pixels.planes),

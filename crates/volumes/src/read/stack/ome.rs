@@ -43,6 +43,8 @@ pub(super) fn is_meant(text: &str) -> bool {
 /// What the description tells.
 pub(super) struct Pixels {
     pub planes: Planes,
+    /// Whether the pages are where they are by the order of the axes.
+    pub is_in_order: bool,
     /// The sides of voxels, in the unit of the first one.
     pub sides: Option<DVec3>,
     /// Whether the distance of pages is not told, and that of rows instead.
@@ -64,14 +66,14 @@ impl Pixels {
         let sizes: Vec<(char, u64)> = sizes.collect::<Result<_, _>>()?;
         let planes = Planes::new(&sizes).ok_or("DimensionOrder is not one of X, Y, Z, C, T")?;
         // Of the other images there are other pages.
-        for part in elements.take_while(|element| element.name() != "Pixels") {
-            if part.name() == "TiffData" && !part.is_in_order(&planes)? {
-                return Err("the pages are in another order than DimensionOrder says".to_owned());
-            }
-        }
+        let parts = elements.take_while(|element| element.name() != "Pixels");
+        let mut pages = parts.filter(|element| element.name() == "TiffData");
+        let is_in_order: Result<bool, String> =
+            pages.try_fold(true, |all, page| Ok(all && page.is_in_order(&planes)?));
         let [x, y, z] = pixels.sides()?;
         Ok(Self {
             planes,
+            is_in_order: is_in_order?,
             sides: x.zip(y).map(|(x, y)| DVec3::new(x, y, z.unwrap_or(y))),
             lacks_distance: x.is_some() && z.is_none(),
         })
