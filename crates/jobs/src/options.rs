@@ -23,9 +23,9 @@ const ADVANCED: &str = "Advanced";
 pub struct InputOptions {
     /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
     ///
-    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh, .mgz,
-    /// .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc, ring,
-    /// cross, rectangle, sphere, cube, torus, coin, figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is
+    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh,
+    /// .mgz, .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc,
+    /// ring, cross, rectangle, sphere, cube, torus, coin, figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is
     /// box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is standard input.
     pub input: Option<Input>,
 
@@ -114,8 +114,9 @@ pub struct OperatorOptions {
 
     /// Formulation of a time step
     ///
-    /// The values speak of calibration and of a paper. Calibration corrects the error of the network in the energy: it divides the motion and the
-    /// bending energy, the two terms that a time step minimizes, by a factor each. The paper is that of Rumpf, Sassen and Norden-Smoch.
+    /// The descriptions of the possible values use two terms, calibration and the paper. Calibration corrects the error of the network in the energy:
+    /// it divides the motion and the bending energy, the two terms that a time step minimizes, by a factor each. The paper is that of Rumpf, Sassen
+    /// and Norden-Smoch.
     #[arg(
         long = "scheme",
         value_name = "NAME",
@@ -393,9 +394,9 @@ pub struct FairOptions {
 
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
-    /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. For
-    /// a segmentation, `noise` is refused: unless one of these four options says when to stop, the flow of a segmentation stops at the time
-    /// (1.6 voxels)^4, or earlier if its surface has moved by 0.35 of a voxel.
+    /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. For a
+    /// segmentation, `noise` is refused. Its flow stops at the time (1.6 voxels)^4, or earlier if its surface has moved by 0.35 of a voxel. If one of
+    /// these four options says when to stop, that option decides instead.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
 
