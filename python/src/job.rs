@@ -3,10 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
-use willmore::jobs::{
-    self, Job, Opened, Results, StepState,
-    Steps, settings,
-};
+use willmore::jobs::{self, Job, Opened, Results, StepState, Steps, settings};
 use willmore::prelude as w;
 
 use crate::error::{Error, detached, in_python, of_job, raised};
@@ -191,7 +188,9 @@ impl PySteps {
 impl PySteps {
     /// Makes a step, unless the flow is over, and says whether it made one.
     fn step(&self, py: Python<'_>) -> PyResult<bool> {
-        self.with(py, |steps| Ok(steps.next().transpose().map_err(of_job)?.is_some()))
+        self.with(py, |steps| {
+            Ok(steps.next().transpose().map_err(of_job)?.is_some())
+        })
     }
 
     /// The number of records so far.
@@ -202,13 +201,17 @@ impl PySteps {
 
     /// A record, as JSON.
     fn record(&self, py: Python<'_>, number: usize) -> PyResult<Option<String>> {
-        self.with(py, |steps| steps.records().get(number).map(json).transpose())
+        self.with(py, |steps| {
+            steps.records().get(number).map(json).transpose()
+        })
     }
 
     /// Parts and holes in words, unless the shape touches itself or has vanished.
     #[getter]
     fn topology(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        self.with(py, |steps| Ok(steps.topology().map(|topology| topology.to_string())))
+        self.with(py, |steps| {
+            Ok(steps.topology().map(|topology| topology.to_string()))
+        })
     }
 
     /// Whether the shape touches the side of the box.
@@ -238,7 +241,11 @@ impl PySteps {
     /// The results so far.
     fn results(&self, py: Python<'_>) -> PyResult<PyResults> {
         let results = self.with(py, |steps| steps.results().map_err(of_job))?;
-        Ok(PyResults::new(results, self.warnings.clone(), self.notes.clone()))
+        Ok(PyResults::new(
+            results,
+            self.warnings.clone(),
+            self.notes.clone(),
+        ))
     }
 }
 

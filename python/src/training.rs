@@ -17,7 +17,9 @@ pub struct PyNetwork(model::Network);
 impl PyNetwork {
     #[staticmethod]
     fn load(path: &str) -> PyResult<Self> {
-        model::Network::load(path.as_ref()).map(Self).map_err(|error| raised(&error))
+        model::Network::load(path.as_ref())
+            .map(Self)
+            .map_err(|error| raised(&error))
     }
 
     /// One of those that come with the package, by its name in the list of `willmore networks`.
@@ -27,11 +29,15 @@ impl PyNetwork {
         for shipped in all {
             let shipped = shipped.map_err(|error| raised(&error))?;
             let mut named = shipped.into_iter();
-            if let Some((_, network)) = named.find(|(of, _)| of.trim_end_matches(".safetensors") == name) {
+            if let Some((_, network)) =
+                named.find(|(of, _)| of.trim_end_matches(".safetensors") == name)
+            {
                 return Ok(Self(network));
             }
         }
-        Err(Error::new_err(format!("there is no network {name:?}: `willmore networks` lists them")))
+        Err(Error::new_err(format!(
+            "there is no network {name:?}: `willmore networks` lists them"
+        )))
     }
 
     fn save(&self, path: &str) -> PyResult<()> {
