@@ -33,6 +33,10 @@ pub fn in_python(message: &str) -> String {
     message
         .replace("`keep`", "`fixed`")
         .replace("`label` all", "no `label`")
+        .replace(
+            "`willmore resume` goes on with more `steps`",
+            "a flow with more `steps` goes on",
+        )
 }
 
 /// Does long work without the interpreter's lock. A panic, which is a bug, becomes an [`Error`] too: it must not end a session.

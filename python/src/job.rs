@@ -121,6 +121,17 @@ pub fn run(
     Ok(PyResults::new(results, watcher.warnings(), watcher.notes()))
 }
 
+/// The labels of a segmentation but 0; nothing if it holds none.
+#[pyfunction]
+pub fn labels(py: Python<'_>, input: &Input) -> PyResult<Vec<i64>> {
+    let options = jobs::InputOptions {
+        label: Some(w::Label::All),
+        ..jobs::InputOptions::of(input.0.clone())
+    };
+    let labels = detached(py, || jobs::labels(&options).map_err(of_job))?;
+    Ok(labels.unwrap_or_default())
+}
+
 /// Does a job in a folder, and returns what came out, as JSON. Interrupted, it can be resumed.
 #[pyfunction]
 #[pyo3(signature = (name, input, options, progress=None, mask=None))]
@@ -214,10 +225,20 @@ impl PySteps {
         })
     }
 
-    /// Whether the shape touches the side of the box.
+    /// Whether the shape touches the side of the box, or has come so near to it that this ended the flow.
     #[getter]
     fn touches_box(&self, py: Python<'_>) -> PyResult<bool> {
-        self.with(py, |steps| Ok(steps.touches_box()))
+        self.with(py, |steps| {
+            Ok(steps.touches_box() || steps.ended() == Some(w::Stop::AtTheSide))
+        })
+    }
+
+    /// The energy at the beginning, once the first step has measured it.
+    #[getter]
+    fn first_energy(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        self.with(py, |steps| {
+            Ok(steps.records().first().and_then(w::Record::energy_at_rest))
+        })
     }
 
     /// The measures at the beginning, as JSON.

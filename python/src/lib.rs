@@ -30,7 +30,7 @@ mod _willmore {
     #[pymodule_export]
     use crate::input::Input;
     #[pymodule_export]
-    use crate::job::{PyResults, PyState, PySteps, begin, resume, run, run_in_folder};
+    use crate::job::{PyResults, PyState, PySteps, begin, labels, resume, run, run_in_folder};
     #[pymodule_export]
     use crate::program;
     #[pymodule_export]

@@ -37,13 +37,23 @@ impl PyShape {
         }
     }
 
-    /// The bytes of a file.
-    fn encode<'py>(&self, py: Python<'py>, format: &str) -> PyResult<Bound<'py, PyBytes>> {
+    /// The bytes of a file. Of a mesh that came in as arrays there are only the triangles, and not the marks of the vertices that stay.
+    fn encode<'py>(
+        &self,
+        py: Python<'py>,
+        format: &str,
+        of_arrays: bool,
+    ) -> PyResult<Bound<'py, PyBytes>> {
         let Some(shape) = &self.0 else {
             return Err(Error::new_err(
                 "the shape has vanished: there is nothing to save",
             ));
         };
+        if let (Shape::Surface(surface), true) = (shape, of_arrays) {
+            let name = format!("mesh.{format}");
+            let bytes = surfaces::encode_with_up(name, &surface.mesh, surface.up);
+            return Ok(PyBytes::new(py, &bytes.map_err(|error| raised(&error))?));
+        }
         Ok(PyBytes::new(py, &shape.encode(format).map_err(of_job)?))
     }
 }

@@ -31,7 +31,7 @@ def test_states_come_one_by_one_and_stay():
     assert not np.array_equal(fields[0], fields[1])
     times, energies = [state.time for state in states], [state.energy for state in states]
     assert (np.diff(times) > 0).all() and (np.diff(energies) < 0).all()
-    assert flow.start.step == 0 and flow.start.time == 0 and flow.start.energy is None
+    assert flow.start.step == 0 and flow.start.time == 0 and flow.start.energy > energies[0]
     assert states[-1].sizes["length"] < flow.start.sizes["length"]
 
 
@@ -50,10 +50,11 @@ def test_result_and_metrics():
     assert list(result.metrics["step"]) == [1, 2, 3, 4, 5]
     # The rows of the metrics are those of the states.
     for i, state in enumerate(states):
-        for name in ("time", "tau", "energy_before", "energy", "willmore_energy", "area", "length", "newton", "hvp"):
+        for name in ("time", "tau", "objective_before", "objective", "energy", "area", "length", "newton", "hvp"):
             assert result.metrics[name][i] == state.record[name]
-    assert result.metrics["energy"][0] <= result.metrics["energy_before"][0]
-    assert result.report["energy"] == result.metrics["willmore_energy"][-1] > 0
+    assert result.metrics["objective"][0] <= result.metrics["objective_before"][0]
+    assert result.report["energy"] == result.metrics["energy"][-1] > 0 and states[1].energy == result.metrics["energy"][1]
+    assert flow.start.energy == result.report["first_energy"]
     assert np.array_equal(result.field, willmore.flow("builtin:cross", **CROSS).run().field)
 
 
@@ -249,7 +250,7 @@ def test_a_flow_goes_on_after_ctrl_c():
     assert interruptions > 0
     # A step whose state was not taken is complete all the same.
     assert all(energies[step] == whole[step - 1] for step in energies)
-    assert list(flow.result().metrics["willmore_energy"]) == whole
+    assert list(flow.result().metrics["energy"]) == whole
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signals of this kind")

@@ -340,3 +340,14 @@ def test_signed_distance(sphere):
     for mesh, where in ((sphere, [0, 0]), ((sphere[0], sphere[1][1:]), [0, 0, 0]), ("builtin:cube", [0, 0, 0]), (sphere, "here")):
         with pytest.raises(willmore.Error):
             willmore.signed_distance(mesh, where)
+
+
+def test_files_have_no_marks_of_fixed_vertices(tmp_path):
+    mesh = trimesh.creation.icosphere(2)
+    fixed = mesh.vertices[:, 2] < 0
+    result = willmore.fair(mesh, fixed=fixed, steps=1, cells=24)
+    result.save(tmp_path / "fixed.ply")
+    assert b"red" not in (tmp_path / "fixed.ply").read_bytes()[:400]
+    assert result.to_trimesh() is result.mesh
+    with pytest.raises(willmore.Error, match="indices"):
+        willmore.fair(mesh, fixed=np.flatnonzero(fixed), steps=1, cells=24)

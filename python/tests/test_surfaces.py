@@ -156,3 +156,13 @@ def test_refused_grids():
 def test_the_label_of_the_outside_is_refused():
     with pytest.raises(willmore.Error, match="outside"):
         willmore.surfaces(np.ones((4, 4, 4), np.uint8), label=[1, 0])
+
+
+def test_a_file_by_its_name(tmp_path):
+    labels = np.zeros((16, 16, 16), np.uint8)
+    labels[4:12, 4:12, 4:12] = 3
+    nibabel.save(nibabel.Nifti1Image(labels, np.diag([2.0, 2.0, 2.0, 1.0])), tmp_path / "labels.nii.gz")
+    (of_file,) = willmore.surfaces(tmp_path / "labels.nii.gz", cells=24).items()
+    (of_array,) = willmore.surfaces(labels, spacing=2, cells=24).items()
+    assert of_file[0] == of_array[0] == 3
+    assert np.array_equal(of_file[1].field, of_array[1].field)

@@ -25,7 +25,7 @@ class State:
     time : float
         The time, a length to the fourth power.
     energy : float or None
-        The energy after the step; None at the beginning, where no step has measured it.
+        The energy after the step. At the beginning it is None until the first step has measured it; `willmore.energy` measures it before.
     sizes : dict of float
         Length and area of a curve, area and volume of a surface, and the reduced volume.
     record : dict
@@ -47,7 +47,7 @@ class State:
         self.record, self.sizes = record, sizes
         self.step: int = record.get("step", 0)
         self.time: float = record.get("time", 0.0)
-        self.energy: float | None = record.get("willmore_energy")
+        self.energy: float | None = record.get("energy")
 
     @cached_property
     def _shape(self) -> Any:
@@ -85,7 +85,15 @@ class State:
 
     def save(self, path: Any) -> None:
         """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg), as `Result.save`."""
-        _results.save(self._shape, path)
+        _results.save(self._shape, path, self._source)
+
+    def to_trimesh(self) -> Any:
+        """The surface as a ``trimesh.Trimesh``, as `Result.to_trimesh`."""
+        return _results.to_trimesh(self.mesh, self._shape)
+
+    def to_pyvista(self) -> Any:
+        """The surface as a ``pyvista.PolyData``, as `Result.to_pyvista`."""
+        return _results.to_pyvista(self.mesh, self._shape)
 
     def __repr__(self) -> str:
         energy = "" if self.energy is None else f", energy {self.energy:.6g}"
@@ -127,6 +135,7 @@ class Flow(Iterator[State]):
                 raise StopIteration
             record = json.loads(self._steps.record(self._told) or "{}")
             self._told += 1
+            self.start.energy = self._steps.first_energy
             if record["completes_step"]:
                 self._doubt(record["step"])
                 return State(self._steps.state, self._source, _results.row(record), record["measures"])
@@ -138,7 +147,7 @@ class Flow(Iterator[State]):
         if None not in (topology, self._topology) and topology != self._topology:
             doubts.append(f"step {step}: parts or holes have come or gone, {topology} where there were {self._topology}")
         if touches_box and not self._touches_box:
-            doubts.append(f"step {step}: the shape touches the side of the box, beyond which is its periodic image; a smaller `side_length` gives it room")
+            doubts.append(f"step {step}: the shape has come to the side of the box, beyond which is its periodic image: a larger `box_side` or a smaller `side_length` gives it room")
         self._topology, self._touches_box = topology or self._topology, touches_box
         self.warnings += doubts
         tell(doubts)

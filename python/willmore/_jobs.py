@@ -13,7 +13,7 @@ from ._inputs import Source
 from ._options import in_memory
 from ._progress import Progress, told
 from ._results import Result, picture_of, tell
-from ._willmore import Error
+from ._willmore import Error, Input
 
 
 def fair(
@@ -131,8 +131,9 @@ def surfaces(
 
     Parameters
     ----------
-    labels : (n, m, k) array, or an image of nibabel or pyvista
-        Labels, of which 0 is outside; a mask; or grey values with `threshold`.
+    labels : (n, m, k) array, an image of nibabel or pyvista, or the name of a file
+        Labels, of which 0 is outside; a mask; or grey values with `threshold`. Each label is smoothed alone: the surfaces of two labels that touch can
+        overlap or part by about a voxel.
     label : int or sequence of int, optional
         The labels that become surfaces, by default all but 0.
     threshold : float, optional
@@ -169,14 +170,20 @@ def surfaces(
     >>> bool(abs(ball.report["volume"] / (8 * 1472) - 1) < 0.02)
     True
     """
-    voxels = _inputs.of_voxels(labels, affine=affine, spacing=spacing, origin=origin)
     options = {"volume": volume, "cells": cells, **more}
-    source = Source(voxels.input())
+    name = _meshes.of_path(labels)
+    voxels = None if name is not None else _inputs.of_voxels(labels, affine=affine, spacing=spacing, origin=origin)
+    if voxels is None and not (affine is None and spacing is None and origin is None):
+        raise Error("a file says itself where its voxels are: leave out `affine`, `spacing` and `origin`")
+    source = Source(Input.named(str(name)) if voxels is None else voxels.input())
     if threshold is not None:
         if label is not None:
             raise Error("`threshold` and `label` are two ways to say what is inside: give one of them")
         return {1: _run("fair", source, {**options, "threshold": threshold}, progress)}
-    wanted = _labels_of(voxels.values, label)
+    if voxels is None and label is None:
+        wanted = _willmore.labels(source.input)
+    else:
+        wanted = _labels_of(np.array([]) if voxels is None else voxels.values, label)
     return {one: _run("fair", source, {**options, "label": one}, progress) for one in wanted}
 
 

@@ -51,7 +51,8 @@ class Result:
     warnings, notes : list of str
         What you should know before you trust the result, and which choices were made.
     metrics : dict of arrays
-        Time, energy, sizes and costs of every step.
+        ``step``, ``time``, ``tau`` (the size of the step), ``energy`` (after it), ``area`` and so on, and costs such as ``hvp`` (products with the
+        Hessian). ``objective`` is what a step minimizes: the motion and the energy.
     ended : str
         The rule that ended the flow.
     """
@@ -101,7 +102,8 @@ class Result:
         Parameters
         ----------
         path
-            The file. Its ending says the format. A file that is there is written over.
+            The file. Its ending says the format. A file that is there is written over. Of a mesh that came in as arrays or an object, positions and
+            faces are written; ``mesh.export`` of trimesh writes colours, too.
 
         Raises
         ------
@@ -110,35 +112,43 @@ class Result:
         OSError
             A file that cannot be written.
         """
-        save(self._shape, path)
+        save(self._shape, path, self._source)
 
     def to_trimesh(self) -> Any:
-        """The surface as a ``trimesh.Trimesh``."""
-        import trimesh
-
-        vertices, faces = self._triangles()
-        return trimesh.Trimesh(vertices, faces, process=False)
+        """The surface as a ``trimesh.Trimesh``: `mesh` itself, if that is one."""
+        return to_trimesh(self.mesh, self._shape)
 
     def to_pyvista(self) -> Any:
-        """The surface as a ``pyvista.PolyData``."""
-        import pyvista
-
-        return pyvista.PolyData.from_regular_faces(*self._triangles())
-
-    def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
-        mesh = self._shape.mesh
-        if mesh is None:
-            raise Error("there is no surface")
-        return mesh[0], mesh[1].astype(np.int64)
+        """The surface as a ``pyvista.PolyData``: `mesh` itself, if that is one."""
+        return to_pyvista(self.mesh, self._shape)
 
     def __repr__(self) -> str:
         command, steps = self.report.get("command"), self.report.get("steps")
-        return f"<Result of {command}: {steps} steps, {self.ended}>"
+        return f"<Result of {command}: {steps} steps, {self.ended or 'goes on'}>"
 
 
-def save(shape: Shape, path: str | os.PathLike[str]) -> None:
+def to_trimesh(mesh: Any, shape: Shape) -> Any:
+    import trimesh
+
+    return mesh if isinstance(mesh, trimesh.Trimesh) else trimesh.Trimesh(*_triangles(shape), process=False)
+
+
+def to_pyvista(mesh: Any, shape: Shape) -> Any:
+    import pyvista
+
+    return mesh if isinstance(mesh, pyvista.PolyData) else pyvista.PolyData.from_regular_faces(*_triangles(shape))
+
+
+def _triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    mesh = shape.mesh
+    if mesh is None:
+        raise Error("there is no surface")
+    return mesh[0], mesh[1].astype(np.int64)
+
+
+def save(shape: Shape, path: str | os.PathLike[str], source: Source) -> None:
     path = os.fspath(path)
-    encoded = shape.encode(os.path.splitext(path)[1].lstrip(".").lower())
+    encoded = shape.encode(os.path.splitext(path)[1].lstrip(".").lower(), source.mesh is not None)
     with open(path, "wb") as file:
         file.write(encoded)
 
@@ -197,7 +207,13 @@ def row(record: dict[str, Any]) -> dict[str, Any]:
     if made is not None:
         # Products with the Hessian are also made by the first guess, and by steps that were refused.
         values["hvp"] = record.get("refused_hvp", 0) + made["start"]["hvp"] + made["newton"]["hvp"]
-    return values
+    return renamed(values)
+
+
+def renamed(values: dict[str, Any]) -> dict[str, Any]:
+    """The energy of the shape is called so, and what a step minimizes is its objective."""
+    names = {"energy": "objective", "energy_before": "objective_before", "willmore_energy": "energy"}
+    return {names.get(name, name): value for name, value in values.items()}
 
 
 def columns(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from . import _inputs, _meshes, _willmore
 from ._options import named
 from ._progress import Progress, told
-from ._results import columns, tell
+from ._results import columns, renamed, tell
 from ._training import Network
 from ._willmore import Error
 
@@ -149,7 +149,7 @@ class Run:
     def metrics(self) -> dict[str, np.ndarray]:
         with open(self.folder / "metrics.csv", newline="", encoding="utf-8") as file:
             rows = [{name: _number(text) for name, text in row.items()} for row in csv.DictReader(file)]
-        return columns(rows)
+        return columns([renamed(row) for row in rows])
 
     @property
     def field(self) -> np.ndarray:
@@ -171,7 +171,8 @@ class Run:
         return None
 
     def __repr__(self) -> str:
-        return f"<Run in {self.folder}, {'finished' if self.finished else 'not finished'}>"
+        steps = self.report.get("steps")
+        return f"<Run in {self.folder}, {'not finished' if steps is None else f'{steps} steps, finished'}>"
 
 
 def _number(text: str) -> Any:

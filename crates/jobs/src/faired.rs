@@ -23,11 +23,11 @@ pub struct Faired {
 
 impl Faired {
     /// A new mesh in place of a surface.
-    pub fn anew(before: &ClosedMesh, mesh: TriangleMesh, up: UpAxis) -> Result<Self> {
+    pub fn anew(before: &ClosedMesh, mesh: TriangleMesh, up: UpAxis) -> Self {
         let distance = MeshDistance::new(before);
         let lengths = distance.signed_distances(&mesh.vertices).into_iter();
         let lengths: Vec<f64> = lengths.map(f64::abs).collect();
-        Ok(Self {
+        Self {
             report: MeshReport::new(before, &mesh, &lengths),
             displacement: Displacement {
                 lost: vec![false; lengths.len()],
@@ -40,7 +40,7 @@ impl Faired {
                 up,
                 file: None,
             },
-        })
+        }
     }
 }
 

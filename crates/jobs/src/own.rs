@@ -209,7 +209,7 @@ impl OwnMesh {
                 };
                 mesh = mesh.with_volume(rough.volume(), moves);
             }
-            let mut made = Faired::anew(rough, mesh, up)?;
+            let mut made = Faired::anew(rough, mesh, up);
             made.report.noise = Some(self.noise);
             return Ok(made);
         }

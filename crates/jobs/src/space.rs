@@ -109,7 +109,7 @@ impl Presentation<3> for Space {
         let before = surfaces::phase_field_surface(start, eps)?;
         match ClosedMesh::new(before.with_volume(volume, |_| true)) {
             Ok((before, _)) if before.volume() > 0.0 => {
-                Faired::anew(&before, surface(u, eps)?, self.up).map(Some)
+                Ok(Some(Faired::anew(&before, surface(u, eps)?, self.up)))
             }
             _ => Ok(None),
         }
