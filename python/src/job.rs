@@ -6,29 +6,22 @@ use pyo3::prelude::*;
 use willmore::jobs::{self, Job, Opened, Results, StepState, Steps, settings};
 use willmore::prelude as w;
 
-use crate::error::{Error, detached, in_python, of_job, raised};
+use crate::error::{detached, in_python, of_job, raised};
 use crate::input::Input;
 use crate::shape::{FieldArray, PyShape, field_array};
-use crate::watcher::PyWatcher;
+use crate::watcher::watched;
 
 /// Options by the names of the library. None stands for a flag.
 pub type Options = Vec<(String, Option<String>)>;
 
-/// Options from their names.
-pub fn read<O: clap::Args>(options: &Options) -> PyResult<O> {
-    let named = options.iter().map(|(name, value)| (&**name, value.clone()));
-    jobs::options_of(named).map_err(of_job)
+/// Options as the library reads them.
+pub fn named(options: &Options) -> impl Iterator<Item = (&str, Option<String>)> {
+    options.iter().map(|(name, value)| (&**name, value.clone()))
 }
 
 /// A job from its name, its options, and the mask of an inpainting.
 fn job(name: &str, input: &Input, options: &Options, mask: Option<&Input>) -> PyResult<Job> {
-    let mut job = match name {
-        "flow" => Job::Flow(read(options)?),
-        "fair" => Job::Fair(read(options)?),
-        "inpaint" => Job::Inpaint(read(options)?),
-        "mcf" => Job::Mcf(read(options)?),
-        _ => return Err(Error::new_err(format!("{name:?} is no job"))),
-    };
+    let mut job = Job::of_named(name, named(options)).map_err(of_job)?;
     job.input().input = Some(input.0.clone());
     if let Job::Inpaint(inpaint) = &mut job {
         inpaint.mask = mask.map(|mask| mask.0.clone());
@@ -93,13 +86,10 @@ impl PyResults {
 
     #[getter]
     fn field<'py>(&self, py: Python<'py>) -> PyResult<FieldArray<'py>> {
-        field_array(
-            py,
-            &match &self.results {
-                Results::Plane(made) => Opened::Plane(made.field.clone()),
-                Results::Space(made) => Opened::Space(made.field.clone()),
-            },
-        )
+        match &self.results {
+            Results::Plane(made) => field_array(py, &made.field),
+            Results::Space(made) => field_array(py, &made.field),
+        }
     }
 }
 
@@ -115,9 +105,7 @@ pub fn run(
     mask: Option<&Input>,
 ) -> PyResult<PyResults> {
     let job = job(name, input, &options, mask)?;
-    let watcher = PyWatcher::new(progress);
-    let made = detached(py, || jobs::run_in_memory(job, &watcher).map_err(of_job));
-    let results = watcher.check(made)?;
+    let (results, watcher) = watched(py, progress, |watcher| jobs::run_in_memory(job, watcher))?;
     Ok(PyResults::new(results, watcher.warnings(), watcher.notes()))
 }
 
@@ -144,9 +132,7 @@ pub fn run_in_folder(
     mask: Option<&Input>,
 ) -> PyResult<(String, Vec<String>)> {
     let job = job(name, input, &options, mask)?;
-    let watcher = PyWatcher::new(progress);
-    let made = detached(py, || jobs::run_in_folder(job, &watcher).map_err(of_job));
-    let outcome = watcher.check(made)?;
+    let (outcome, watcher) = watched(py, progress, |watcher| jobs::run_in_folder(job, watcher))?;
     Ok((outcome.to_json().to_string(), watcher.warnings()))
 }
 
@@ -159,15 +145,13 @@ pub fn resume(
     steps: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, Vec<String>)> {
-    let watcher = PyWatcher::new(progress);
-    let made = detached(py, || {
-        let stored = w::RunDirectory::open(folder).map_err(|error| raised(&error))?;
-        let mut job = settings::job_of(&stored).map_err(of_job)?;
+    let (outcome, watcher) = watched(py, progress, |watcher| {
+        let stored = w::RunDirectory::open(folder)?;
+        let mut job = settings::job_of(&stored)?;
         // A run that was over may have written the file of `save` itself.
         job.run().force.force |= stored.is_finished();
-        jobs::resume(job, stored, steps, &watcher).map_err(of_job)
-    });
-    let outcome = watcher.check(made)?;
+        jobs::resume(job, stored, steps, watcher)
+    })?;
     Ok((outcome.to_json().to_string(), watcher.warnings()))
 }
 
@@ -217,11 +201,10 @@ impl PySteps {
         })
     }
 
-    /// Parts and holes in words, unless the shape touches itself or has vanished.
-    #[getter]
-    fn topology(&self, py: Python<'_>) -> PyResult<Option<String>> {
+    /// Says when parts or holes have come or gone since it was asked last.
+    fn change(&self, py: Python<'_>) -> PyResult<Option<String>> {
         self.with(py, |steps| {
-            Ok(steps.topology().map(|topology| topology.to_string()))
+            Ok(steps.change().map(|change| in_python(&change.to_string())))
         })
     }
 
@@ -281,9 +264,7 @@ pub fn begin(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PySteps> {
     let job = job(name, input, &options, None)?;
-    let watcher = PyWatcher::new(progress);
-    let begun = detached(py, || jobs::begin(job, &watcher).map_err(of_job));
-    let steps = watcher.check(begun)?;
+    let (steps, watcher) = watched(py, progress, |watcher| jobs::begin(job, watcher))?;
     Ok(PySteps {
         dimension: steps.dimension(),
         steps: Mutex::new(steps),
@@ -300,7 +281,10 @@ pub struct PyState(StepState);
 impl PyState {
     #[getter]
     fn field<'py>(&self, py: Python<'py>) -> PyResult<FieldArray<'py>> {
-        field_array(py, &self.0.field())
+        match self.0.field() {
+            Opened::Plane(u) => field_array(py, &u),
+            Opened::Space(u) => field_array(py, &u),
+        }
     }
 
     #[getter]

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use willmore::jobs::{Opened, Shape};
+use willmore::jobs::Shape;
 use willmore::prelude as w;
 
 use crate::error::{Error, detached, of_job, raised};
@@ -61,22 +61,14 @@ impl PyShape {
 /// A phase field as a flat array, its cells along each side, its spacing and its origin.
 pub type FieldArray<'py> = (Bound<'py, PyArray1<f64>>, usize, f64, Vec<f64>);
 
-pub fn field_array<'py>(py: Python<'py>, of: &Opened) -> PyResult<FieldArray<'py>> {
-    fn parts<const D: usize>(u: &w::Stored<D>) -> PyResult<(Vec<f64>, usize, f64, Vec<f64>)> {
-        let grid = *u.grid();
-        let field = u.field().map_err(|error| raised(&error))?;
-        Ok((
-            field.into_values(),
-            grid.cells(),
-            grid.spacing(),
-            grid.origin().to_vec(),
-        ))
-    }
-    let (values, cells, spacing, origin) = detached(py, || match of {
-        Opened::Plane(u) => parts(u),
-        Opened::Space(u) => parts(u),
-    })?;
-    Ok((PyArray1::from_vec(py, values), cells, spacing, origin))
+pub fn field_array<'py, const D: usize>(
+    py: Python<'py>,
+    u: &w::Stored<D>,
+) -> PyResult<FieldArray<'py>> {
+    let grid = *u.grid();
+    let field = detached(py, || u.field().map_err(|error| raised(&error)))?;
+    let values = PyArray1::from_vec(py, field.into_values());
+    Ok((values, grid.cells(), grid.spacing(), grid.origin().to_vec()))
 }
 
 pub fn arrays<'py>(
@@ -127,7 +119,7 @@ pub fn signed_distances<'py>(
     Ok(PyArray1::from_vec(py, distances))
 }
 
-/// A closed mesh of one that bounds nothing, and what was changed, as JSON.
+/// A closed mesh of one that bounds nothing, and what was changed, in words.
 #[pyfunction]
 pub fn repair<'py>(
     py: Python<'py>,

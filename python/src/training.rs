@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use willmore::jobs::{self, TrainOptions};
 use willmore::model::{self, Shipped};
 
-use crate::error::{Error, detached, of_job, raised};
-use crate::job::{Options, json, read};
-use crate::watcher::PyWatcher;
+use crate::error::{Error, raised};
+use crate::job::{Options, json, named};
+use crate::watcher::watched;
 
 /// A learned step of mean curvature flow.
 #[pyclass(frozen, module = "willmore._willmore", name = "NetworkData")]
@@ -75,9 +75,9 @@ pub fn train(
     options: Options,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(PyNetwork, f64)> {
-    let options = read::<TrainOptions>(&options)?;
-    let watcher = PyWatcher::new(progress);
-    let trained = detached(py, || jobs::train(options, &watcher).map_err(of_job));
-    let trained = watcher.check(trained)?;
+    let (trained, _) = watched(py, progress, |watcher| {
+        let options: TrainOptions = jobs::options_of(named(&options))?;
+        jobs::train(options, watcher)
+    })?;
     Ok((PyNetwork(trained.network), trained.held_out_loss))
 }

@@ -4,8 +4,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
-use willmore::jobs::{Note, Progress, Warning, Watcher};
+use willmore::jobs::{self, Note, Progress, Warning, Watcher};
 use willmore::runs::{self, Interrupt};
+
+use crate::error::{detached, in_python, of_job};
+
+/// Does long work of the library without the interpreter's lock, and returns what its watcher has heard, too.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&PyWatcher) -> Result<T, jobs::Error> + Send,
+) -> PyResult<(T, PyWatcher)> {
+    let watcher = PyWatcher::new(progress);
+    let done = detached(py, || work(&watcher).map_err(of_job));
+    Ok((watcher.check(done)?, watcher))
+}
 
 /// Collects warnings and notes, calls `progress(title, done, parts)`, and ends a job between two steps when Python has a signal to handle.
 pub struct PyWatcher {
@@ -17,7 +30,7 @@ pub struct PyWatcher {
 }
 
 impl PyWatcher {
-    pub fn new(progress: Option<Py<PyAny>>) -> Self {
+    fn new(progress: Option<Py<PyAny>>) -> Self {
         Self {
             progress: progress.map(Arc::new),
             interrupt: Interrupt::never(),
@@ -36,7 +49,7 @@ impl PyWatcher {
     }
 
     /// What a signal or the callback raised, in place of the interruption that it caused.
-    pub fn check<T>(&self, done: PyResult<T>) -> PyResult<T> {
+    fn check<T>(&self, done: PyResult<T>) -> PyResult<T> {
         match locked(&self.raised).take() {
             Some(error) => Err(error),
             None => done,
@@ -46,11 +59,11 @@ impl PyWatcher {
 
 impl Watcher for PyWatcher {
     fn warning(&self, warning: &Warning) {
-        locked(&self.warnings).push(warning.to_string());
+        locked(&self.warnings).push(in_python(&warning.to_string()));
     }
 
     fn note(&self, note: &Note) {
-        locked(&self.notes).push(note.to_string());
+        locked(&self.notes).push(in_python(&note.to_string()));
     }
 
     fn begins(&self, title: &str, parts: u64) -> Box<dyn Progress> {

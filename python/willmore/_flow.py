@@ -10,12 +10,12 @@ import numpy as np
 
 from . import _results
 from ._inputs import Source
-from ._results import Result, tell
+from ._results import Result, Shaped, tell
 from ._willmore import State as _State
 from ._willmore import Steps
 
 
-class State:
+class State(Shaped):
     """A shape after a step of a flow, which stays as it is when the flow goes on.
 
     Attributes
@@ -43,57 +43,17 @@ class State:
     """
 
     def __init__(self, state: _State, source: Source, record: dict[str, Any], sizes: dict[str, float]):
-        self._state, self._source = state, source
+        super().__init__(state, source)
         self.record, self.sizes = record, sizes
         self.step: int = record.get("step", 0)
         self.time: float = record.get("time", 0.0)
         self.energy: float | None = record.get("energy")
 
     @cached_property
-    def _shape(self) -> Any:
-        return self._state.shape
-
-    @cached_property
-    def _field(self) -> tuple[np.ndarray, float, np.ndarray]:
-        return _results.field_of(self._state)
-
-    @property
-    def field(self) -> np.ndarray:
-        return self._field[0]
-
-    @property
-    def spacing(self) -> float:
-        return self._field[1]
-
-    @property
-    def origin(self) -> np.ndarray:
-        return self._field[2]
-
-    @cached_property
-    def mesh(self) -> Any:
-        return _results.mesh_of(self._shape, self._source)
-
-    @cached_property
-    def image(self) -> np.ndarray | None:
-        return _results.image_of(self._shape, self._source)
-
-    @cached_property
     def curves(self) -> list[np.ndarray]:
         from ._shapes import zero_level
 
         return zero_level(self.field, spacing=self.spacing, origin=self.origin) if self.field.ndim == 2 else []
-
-    def save(self, path: Any) -> None:
-        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg), as `Result.save`."""
-        _results.save(self._shape, path, self._source)
-
-    def to_trimesh(self) -> Any:
-        """The surface as a ``trimesh.Trimesh``, as `Result.to_trimesh`."""
-        return _results.to_trimesh(self.mesh, self._shape)
-
-    def to_pyvista(self) -> Any:
-        """The surface as a ``pyvista.PolyData``, as `Result.to_pyvista`."""
-        return _results.to_pyvista(self.mesh, self._shape)
 
     def __repr__(self) -> str:
         energy = "" if self.energy is None else f", energy {self.energy:.6g}"
@@ -122,7 +82,7 @@ class Flow(Iterator[State]):
         self.start = State(steps.state, source, {}, json.loads(steps.start))
         # Records that became states.
         self._told = 0
-        self._topology, self._touches_box = steps.topology, steps.touches_box
+        self._touches_box = steps.touches_box
 
     @property
     def ended(self) -> str | None:
@@ -142,13 +102,14 @@ class Flow(Iterator[State]):
 
     def _doubt(self, step: int) -> None:
         """Warns when parts or holes come or go, and when the shape touches the side of the box."""
-        doubts = []
-        topology, touches_box = self._steps.topology, self._steps.touches_box
-        if None not in (topology, self._topology) and topology != self._topology:
-            doubts.append(f"step {step}: parts or holes have come or gone, {topology} where there were {self._topology}")
+        change, touches_box = self._steps.change(), self._steps.touches_box
+        doubts = [] if change is None else [change]
         if touches_box and not self._touches_box:
-            doubts.append(f"step {step}: the shape has come to the side of the box, beyond which is its periodic image: a larger `box_side` or a smaller `side_length` gives it room")
-        self._topology, self._touches_box = topology or self._topology, touches_box
+            doubts.append(
+                f"step {step}: the shape has come to the side of the box, beyond which is its periodic image: "
+                "a larger `box_side` or a smaller `side_length` gives it room"
+            )
+        self._touches_box = touches_box
         self.warnings += doubts
         tell(doubts)
 

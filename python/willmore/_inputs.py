@@ -57,8 +57,6 @@ def _of_mesh(mesh: _meshes.Kind, fixed: Any) -> Input:
     fixed = _meshes.array("fixed", fixed)
     if fixed.dtype != np.bool_:
         raise Error(f"`fixed` must be an array of bool, not of {fixed.dtype}; from indices: mask = np.zeros(n, bool); mask[indices] = True")
-    if fixed.dtype != np.bool_:
-        raise Error(f"`fixed` must be an array of bool, not of {fixed.dtype}; from indices: mask = np.zeros(n, bool); mask[indices] = True")
     fixed = np.ascontiguousarray(fixed)
     if fixed.shape != (len(vertices),):
         raise Error(f"`fixed` must have one value for each of the {len(vertices)} vertices, not the shape {fixed.shape}")

@@ -320,8 +320,8 @@ def energy(shape: Any, *, spontaneous_curvature: float | None = None, cells: int
     Returns
     -------
     float
-        A sphere has ``8 pi``, a circle of radius ``R`` has ``pi / R``. Edges count as if they had the radius of the interface width: more cells give
-        more energy.
+        A sphere has ``8 pi``, a circle of radius ``R`` has ``pi / R``. Edges and noise count as if they had the radius of the interface width, so that
+        more cells give more energy. Compare energies on grids of the same `cells`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ._inputs import Source
-from ._willmore import Error, Results, Shape
+from ._willmore import Error, Results, Shape, State
 
 
 class WillmoreWarning(UserWarning):
@@ -31,7 +31,84 @@ def tell(messages: list[str]) -> None:
         python_warnings.warn(message, WillmoreWarning, stacklevel=level)
 
 
-class Result:
+class Shaped:
+    """The shape and the phase field of a result or a state."""
+
+    def __init__(self, made: Results | State, source: Source):
+        self._made, self._source = made, source
+
+    @cached_property
+    def _shape(self) -> Shape:
+        return self._made.shape
+
+    @cached_property
+    def _field(self) -> tuple[np.ndarray, float, np.ndarray]:
+        return field_of(self._made)
+
+    @property
+    def field(self) -> np.ndarray:
+        return self._field[0]
+
+    @property
+    def spacing(self) -> float:
+        return self._field[1]
+
+    @property
+    def origin(self) -> np.ndarray:
+        return self._field[2]
+
+    @cached_property
+    def mesh(self) -> Any:
+        return mesh_of(self._shape, self._source)
+
+    @cached_property
+    def image(self) -> np.ndarray | None:
+        return image_of(self._shape, self._source)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg).
+
+        Parameters
+        ----------
+        path
+            The file. Its ending says the format. A file that is there is written over. Of a mesh that came in as arrays or an object, positions and
+            faces are written; ``mesh.export`` of trimesh writes colours, too.
+
+        Raises
+        ------
+        Error
+            A format that the result does not have, and a shape that has vanished.
+        OSError
+            A file that cannot be written.
+        """
+        path = os.fspath(path)
+        ending = os.path.splitext(path)[1].lstrip(".").lower()
+        encoded = self._shape.encode(ending, self._source.mesh is not None)
+        with open(path, "wb") as file:
+            file.write(encoded)
+
+    def to_trimesh(self) -> Any:
+        """The surface as a ``trimesh.Trimesh``: `mesh` itself, if that is one."""
+        import trimesh
+
+        mesh = self.mesh
+        return mesh if isinstance(mesh, trimesh.Trimesh) else trimesh.Trimesh(*self._triangles(), process=False)
+
+    def to_pyvista(self) -> Any:
+        """The surface as a ``pyvista.PolyData``: `mesh` itself, if that is one."""
+        import pyvista
+
+        mesh = self.mesh
+        return mesh if isinstance(mesh, pyvista.PolyData) else pyvista.PolyData.from_regular_faces(*self._triangles())
+
+    def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        mesh = self._shape.mesh
+        if mesh is None:
+            raise Error("there is no surface")
+        return mesh[0], mesh[1].astype(np.int64)
+
+
+class Result(Shaped):
     """What came out of a job.
 
     Attributes
@@ -58,99 +135,20 @@ class Result:
     """
 
     def __init__(self, results: Results, source: Source):
-        self._results, self._source = results, source
+        super().__init__(results, source)
+        self._results = results
         self.report: dict[str, Any] = json.loads(results.report)
         self.warnings: list[str] = results.warnings
         self.notes: list[str] = results.notes
         self.ended: str | None = results.ended
 
     @cached_property
-    def _shape(self) -> Shape:
-        return self._results.shape
-
-    @cached_property
-    def mesh(self) -> Any:
-        return mesh_of(self._shape, self._source)
-
-    @cached_property
-    def image(self) -> np.ndarray | None:
-        return image_of(self._shape, self._source)
-
-    @cached_property
-    def _field(self) -> tuple[np.ndarray, float, np.ndarray]:
-        return field_of(self._results)
-
-    @property
-    def field(self) -> np.ndarray:
-        return self._field[0]
-
-    @property
-    def spacing(self) -> float:
-        return self._field[1]
-
-    @property
-    def origin(self) -> np.ndarray:
-        return self._field[2]
-
-    @cached_property
     def metrics(self) -> dict[str, np.ndarray]:
         return columns([row(record) for record in json.loads(self._results.records)])
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg).
-
-        Parameters
-        ----------
-        path
-            The file. Its ending says the format. A file that is there is written over. Of a mesh that came in as arrays or an object, positions and
-            faces are written; ``mesh.export`` of trimesh writes colours, too.
-
-        Raises
-        ------
-        Error
-            A format that the result does not have, and a shape that has vanished.
-        OSError
-            A file that cannot be written.
-        """
-        save(self._shape, path, self._source)
-
-    def to_trimesh(self) -> Any:
-        """The surface as a ``trimesh.Trimesh``: `mesh` itself, if that is one."""
-        return to_trimesh(self.mesh, self._shape)
-
-    def to_pyvista(self) -> Any:
-        """The surface as a ``pyvista.PolyData``: `mesh` itself, if that is one."""
-        return to_pyvista(self.mesh, self._shape)
 
     def __repr__(self) -> str:
         command, steps = self.report.get("command"), self.report.get("steps")
         return f"<Result of {command}: {steps} steps, {self.ended or 'goes on'}>"
-
-
-def to_trimesh(mesh: Any, shape: Shape) -> Any:
-    import trimesh
-
-    return mesh if isinstance(mesh, trimesh.Trimesh) else trimesh.Trimesh(*_triangles(shape), process=False)
-
-
-def to_pyvista(mesh: Any, shape: Shape) -> Any:
-    import pyvista
-
-    return mesh if isinstance(mesh, pyvista.PolyData) else pyvista.PolyData.from_regular_faces(*_triangles(shape))
-
-
-def _triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    mesh = shape.mesh
-    if mesh is None:
-        raise Error("there is no surface")
-    return mesh[0], mesh[1].astype(np.int64)
-
-
-def save(shape: Shape, path: str | os.PathLike[str], source: Source) -> None:
-    path = os.fspath(path)
-    encoded = shape.encode(os.path.splitext(path)[1].lstrip(".").lower(), source.mesh is not None)
-    with open(path, "wb") as file:
-        file.write(encoded)
 
 
 def mesh_of(shape: Shape, source: Source) -> Any:

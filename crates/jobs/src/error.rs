@@ -50,6 +50,9 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// A name that no job has.
+    #[error("{0:?} is no command")]
+    NoJob(String),
     /// Options by names that cannot be read.
     #[error("{0}")]
     Named(String),

@@ -1,5 +1,6 @@
 //! Jobs that make runs.
 
+use crate::named::options_of;
 use crate::options::{
     CommonOptions, FairOptions, FlowOptions, InpaintOptions, InputOptions, McfOptions,
     OperatorOptions, RunOptions, WillmoreOptions,
@@ -31,6 +32,23 @@ pub(crate) struct Groups<'a> {
 }
 
 impl Job {
+    /// The job of this name with options by their names, without an input, as [`options_of`](crate::options_of) reads them.
+    ///
+    /// # Errors
+    /// [`Error::NoJob`], [`Error::Named`]
+    pub fn of_named<'a>(
+        name: &str,
+        named: impl IntoIterator<Item = (&'a str, Option<String>)>,
+    ) -> Result<Self> {
+        match name {
+            "flow" => options_of(named).map(Self::Flow),
+            "fair" => options_of(named).map(Self::Fair),
+            "inpaint" => options_of(named).map(Self::Inpaint),
+            "mcf" => options_of(named).map(Self::Mcf),
+            _ => Err(Error::NoJob(name.to_owned())),
+        }
+    }
+
     /// Its name.
     pub fn name(&self) -> &'static str {
         match self {

@@ -221,7 +221,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             components: topology.components,
             euler_characteristic: topology.euler_characteristic,
             same_topology: topology == before,
-            touches_box: touches_side(u, -0.5),
+            touches_box: touches_box(run),
             mesh,
             grid: GridSummary {
                 cells: case.grid().cells(),
@@ -291,6 +291,11 @@ pub fn seen<const D: usize>(run: &Run<D>) -> Stored<D> {
         Some(_) => Stored::whole(run.field().clone()),
         None => run.stored().clone(),
     }
+}
+
+/// Whether the shape touches the side of the box, beyond which its periodic image is.
+pub fn touches_box<const D: usize>(run: &Run<D>) -> bool {
+    touches_side(run.stored(), -0.5)
 }
 
 /// The measures at the end, and by how much in percent sizes have changed.

@@ -3,7 +3,6 @@
 use toml::{Table, Value};
 
 use crate::job::Job;
-use crate::named::options_of;
 use crate::prelude::{Error, Path, Result, StoredRun};
 
 /// The file of all options, resolved, in the folder of a run.
@@ -52,14 +51,7 @@ pub fn job(text: &str, path: &Path) -> Result<Job> {
         named.extend(option(name, value).map_err(|problem| bad(&problem))?);
     }
     let named = named.iter().map(|(name, value)| (&**name, value.clone()));
-    let job = match &*command {
-        "flow" => options_of(named).map(Job::Flow),
-        "fair" => options_of(named).map(Job::Fair),
-        "inpaint" => options_of(named).map(Job::Inpaint),
-        "mcf" => options_of(named).map(Job::Mcf),
-        _ => return Err(bad(&format!("{command:?} is no command"))),
-    };
-    let mut job = job.map_err(|error| bad(&error.to_string()))?;
+    let mut job = Job::of_named(&command, named).map_err(|error| bad(&error.to_string()))?;
     job.input().input = input;
     Ok(job)
 }

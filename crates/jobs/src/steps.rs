@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use geometry::measure::touches_side;
-
 use crate::input::Opened;
 use crate::made::{Made, Results, Shape};
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
-use crate::run::{Plan, seen};
+use crate::run::{Plan, seen, touches_box};
 
 /// A job in memory that makes a step when it is asked for one: an iterator over the records of the steps.
 ///
@@ -25,7 +23,11 @@ use crate::run::{Plan, seen};
 /// # Ok(())
 /// # }
 /// ```
-pub struct Steps(Box<dyn Stage>);
+pub struct Steps {
+    stage: Box<dyn Stage>,
+    /// Parts and holes when they were last looked at.
+    before: Option<Topology>,
+}
 
 impl Steps {
     pub(crate) fn new<const D: usize, O>(plan: Plan<'static, D, O>, run: Run<D>) -> Self
@@ -36,32 +38,42 @@ impl Steps {
     {
         let start = Arc::new(run.case().initial.clone());
         let plan = Arc::new(plan);
-        Self(Box::new(Going { plan, start, run }))
+        let stage: Box<dyn Stage> = Box::new(Going { plan, start, run });
+        let before = stage.topology();
+        Self { stage, before }
     }
 
     /// The dimension of the shape.
     pub fn dimension(&self) -> usize {
-        self.0.dimension()
+        self.stage.dimension()
     }
 
     /// The records of the steps so far.
     pub fn records(&self) -> &[Record] {
-        self.0.records()
+        self.stage.records()
     }
 
     /// The measures of the shape at the beginning.
     pub fn start(&self) -> &engine::Values {
-        self.0.start()
+        self.stage.start()
     }
 
-    /// The parts and holes of the shape now, unless it touches itself or has vanished.
-    pub fn topology(&self) -> Option<Topology> {
-        self.0.topology()
+    /// [`Note::TopologyChanged`], if parts or holes have come or gone since the last call or the beginning. A shape that touches itself has none.
+    pub fn change(&mut self) -> Option<Note> {
+        let now = self.stage.topology()?;
+        let before = self.before.replace(now).filter(|before| *before != now)?;
+        let last = self.records().last()?;
+        Some(Note::TopologyChanged {
+            step: last.step,
+            time: last.time,
+            before,
+            now,
+        })
     }
 
     /// Whether the shape touches the side of the box, beyond which its periodic image is.
     pub fn touches_box(&self) -> bool {
-        self.0.touches_box()
+        self.stage.touches_box()
     }
 
     /// The present time.
@@ -71,12 +83,12 @@ impl Steps {
 
     /// The rule that ended the job, if it is over.
     pub fn ended(&self) -> Option<Stop> {
-        self.0.ended()
+        self.stage.ended()
     }
 
     /// The shape as it is now.
     pub fn state(&self) -> StepState {
-        StepState(self.0.state())
+        StepState(self.stage.state())
     }
 
     /// The results so far. A job that is not over can go on.
@@ -84,7 +96,7 @@ impl Steps {
     /// # Errors
     /// A surface that touches itself.
     pub fn results(&self) -> Result<Results> {
-        self.0.results()
+        self.stage.results()
     }
 }
 
@@ -93,7 +105,7 @@ impl Iterator for Steps {
 
     /// Makes a step; none once a stop rule holds.
     fn next(&mut self) -> Option<Self::Item> {
-        self.0.step().transpose()
+        self.stage.step().transpose()
     }
 }
 
@@ -193,7 +205,7 @@ where
     }
 
     fn touches_box(&self) -> bool {
-        touches_side(self.run.stored(), -0.5)
+        touches_box(&self.run)
     }
 
     fn state(&self) -> Arc<dyn Snapshot> {
