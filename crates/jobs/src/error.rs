@@ -51,7 +51,7 @@ pub enum Error {
         problem: String,
     },
     /// A name that no job has.
-    #[error("{0:?} is no command")]
+    #[error("{0:?} is no job")]
     NoJob(String),
     /// Options by names that cannot be read.
     #[error("{0}")]

@@ -51,7 +51,11 @@ pub fn job(text: &str, path: &Path) -> Result<Job> {
         named.extend(option(name, value).map_err(|problem| bad(&problem))?);
     }
     let named = named.iter().map(|(name, value)| (&**name, value.clone()));
-    let mut job = Job::of_named(&command, named).map_err(|error| bad(&error.to_string()))?;
+    let job = Job::of_named(&command, named);
+    let mut job = job.map_err(|error| match error {
+        Error::NoJob(command) => bad(&format!("{command:?} is no command")),
+        error => bad(&error.to_string()),
+    })?;
     job.input().input = input;
     Ok(job)
 }
