@@ -33,6 +33,38 @@ pub fn map<T: Send>(len: usize, share: usize, f: &(dyn Fn(usize) -> T + Sync)) -
     collect(len, share, &|indices| indices.map(f).collect())
 }
 
+/// `f(0), f(1), ...` in a table, which holds `first` before. It takes half of the memory that [`map`] needs.
+pub fn table<T: Copy + Send + Sync>(
+    len: usize,
+    share: usize,
+    first: T,
+    f: &(dyn Fn(usize) -> T + Sync),
+) -> Vec<T> {
+    let mut values = vec![first; len];
+    over_chunks(&mut values, share, &|start, part| {
+        for (value, index) in part.iter_mut().zip(start..) {
+            *value = f(index);
+        }
+    });
+    values
+}
+
+/// Calls `take` with those of `f(0), f(1), ...` that there are, in this order, and keeps only a part of them at a time.
+pub fn in_order<T: Send>(
+    len: usize,
+    share: usize,
+    f: &(dyn Fn(usize) -> Option<T> + Sync),
+    mut take: impl FnMut(T),
+) {
+    let batch = share * PARTS_PER_THREAD;
+    for start in (0..len).step_by(batch) {
+        let of_batch = |index: usize| f(start + index);
+        filter_map(batch.min(len - start), share, &of_batch)
+            .into_iter()
+            .for_each(&mut take);
+    }
+}
+
 /// Those of `f(0), f(1), ...` that there are, in this order.
 pub fn filter_map<T: Send>(
     len: usize,

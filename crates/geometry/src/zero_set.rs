@@ -12,12 +12,12 @@
 //! average over the level sets of `d` of what belongs to one of them, and the sums are those of smooth functions. That the interface has a
 //! width does not matter: `d` need not be a distance, only smooth.
 
-use crate::{Error, Grid, PhaseField, vector};
+use crate::{Error, Grid, PhaseField, parallel, vector};
 
 mod layer;
 mod sizes;
 
-use layer::{Around, Layer};
+use layer::{Layer, SHARE};
 pub use sizes::{SizeHessian, Sizes};
 
 /// Nodes farther than this from the zero set, in spacings, do not count in integrals of the curvature: the differences of differences
@@ -64,16 +64,16 @@ impl ZeroSet {
     fn on<const D: usize>(layer: &Layer<D>) -> Self {
         let (spacing, cell) = (layer.grid.spacing(), layer.grid.cell_volume());
         // Here and not in the loop, see `Layer::around`.
-        let tables = (layer.around(), layer.gradients(), layer.normals());
-        let samples = layer.map(|place| {
+        let tables = (layer.gradients(), layer.normals());
+        let mut sums = Sums::default();
+        let near = |place: usize| {
             let distance = layer.near(place)?;
             (distance.abs() < CURVATURE_REACH * spacing)
                 .then(|| sample(layer, tables, place, distance))
+        };
+        parallel::in_order(layer.nodes.len(), SHARE, &near, |sample| {
+            sums.add(&sample, spacing);
         });
-        let mut sums = Sums::default();
-        for sample in samples.iter().flatten() {
-            sums.add(sample, spacing);
-        }
         Self {
             perimeter: layer.perimeter(),
             volume: layer.volume(),
@@ -111,11 +111,11 @@ struct Sample {
 
 fn sample<const D: usize>(
     layer: &Layer<D>,
-    (around, gradients, normals): (&[Around<D>], &[[f64; D]], &[[f64; D]]),
+    (gradients, normals): (&[[f64; D]], &[[f64; D]]),
     place: usize,
     distance: f64,
 ) -> Sample {
-    let bends = layer.jacobian(&around[place], normals);
+    let bends = layer.jacobian(&layer.around_place(place), normals);
     let curvature: f64 = (0..D).map(|axis| bends[axis][axis]).sum();
     // Two principal curvatures from their sum and the sum of their squares; in 2D the other is zero.
     let squares: f64 = bends.iter().map(|row| vector::dot(*row, *row)).sum();

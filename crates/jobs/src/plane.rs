@@ -177,9 +177,14 @@ impl Presentation<2> for Plane {
         }
     }
 
-    fn topology(&self, u: &Stored<2>, _: f64) -> Result<Topology> {
+    fn topology(&self, u: &Stored<2>) -> Result<Topology> {
+        let components = match Outline::of_phase_field(&u.field()?) {
+            Ok(outline) => outline.curves().len(),
+            Err(images::Error::NoInterface { .. }) => 0,
+            Err(error) => return Err(error.into()),
+        };
         Ok(Topology {
-            components: Outline::of_phase_field(&u.field()?)?.curves().len(),
+            components,
             euler_characteristic: None,
         })
     }

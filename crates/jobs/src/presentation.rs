@@ -45,6 +45,15 @@ impl Topology {
     }
 }
 
+impl From<surfaces::Topology> for Topology {
+    fn from(of_surface: surfaces::Topology) -> Self {
+        Self {
+            components: of_surface.components,
+            euler_characteristic: Some(of_surface.euler_characteristic),
+        }
+    }
+}
+
 impl fmt::Display for Topology {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = if self.components == 1 { "" } else { "s" };
@@ -78,7 +87,7 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
     /// A picture, in the same frame for all steps of a flow from `start`.
     fn picture(&self, start: &Stored<D>, u: &Stored<D>, eps: f64) -> Result<Picture>;
 
-    fn topology(&self, u: &Stored<D>, eps: f64) -> Result<Topology>;
+    fn topology(&self, u: &Stored<D>) -> Result<Topology>;
 
     /// The extensions of files that hold it,
     const SAVED: &'static [&'static str];

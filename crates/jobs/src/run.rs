@@ -112,11 +112,11 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         if has_interface(u) {
             let faired = self.presentation.faired(&run.case().initial, u, eps)?;
             mesh = faired.as_ref().map(|faired| faired.report.clone());
-            topology = self.presentation.topology(u, eps)?;
+            topology = self.presentation.topology(u)?;
             shape = Some(self.presentation.shape(u, eps, faired)?);
         }
         Ok(Made {
-            summary: self.summary(run, topology, mesh),
+            summary: self.summary(run, topology, mesh)?,
             ended: run.ended(),
             records: run.records().to_vec(),
             field: seen(run),
@@ -170,7 +170,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         }
         self.write(run, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
-            topology = presentation.topology(u, eps)?;
+            topology = presentation.topology(u)?;
             if let Some(path) = &self.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
@@ -180,22 +180,25 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         if self.options.frames.is_some() {
             write_film(run, directory)?;
         }
-        let summary = self.summary(run, topology, faired.map(|faired| faired.report));
+        let summary = self.summary(run, topology, faired.map(|faired| faired.report))?;
         let text = format!("{:#}\n", summary.to_json());
         directory.write_file(presentation::SUMMARY, text.as_bytes())?;
         store.finish(run)?;
         Ok(summary)
     }
 
-    fn summary(&self, run: &Run<D>, topology: Topology, mesh: Option<MeshReport>) -> Summary {
+    fn summary(
+        &self,
+        run: &Run<D>,
+        topology: Topology,
+        mesh: Option<MeshReport>,
+    ) -> Result<Summary> {
         let (case, u) = (run.case(), run.stored());
         let eps = case.scales.eps;
-        // Touching sheets have no topology; that is no reason not to flow.
-        let of_start = || {
-            let of_start = self.presentation.topology(&case.initial, eps);
-            of_start.unwrap_or_default()
+        let before = match self.presentation.input() {
+            Some(of_input) => of_input,
+            None => self.presentation.topology(&case.initial)?,
         };
-        let before = self.presentation.input().unwrap_or_else(of_start);
         let (first, last) = (run.records().first(), run.records().last());
         let energy = last.and_then(Record::willmore_energy);
         let first_energy = first.and_then(Record::energy_at_rest);
@@ -206,7 +209,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             Stop::EnergyRatio(part) => Some(part * first_energy?),
             _ => None,
         });
-        Summary {
+        Ok(Summary {
             command: self.command.to_owned(),
             finished: true,
             steps: run.steps(),
@@ -231,7 +234,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
                 stored_cells: run.stored_cells(),
             },
             measures: measures(run),
-        }
+        })
     }
 
     /// Writes the field for ParaView and, unless the shape has vanished, a picture and the shape to files `stem.*` of a run.
@@ -368,9 +371,8 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
                 written.map_err(failed)?;
             }
         }
-        // Touching sheets have no topology.
-        let topology = plan.presentation.topology(u, eps).ok();
-        if let Some((before, now)) = self.topology.zip(topology).filter(|(a, b)| a != b) {
+        let now = plan.presentation.topology(u).map_err(failed)?;
+        if let Some(before) = self.topology.replace(now).filter(|before| *before != now) {
             let time = event.run.time();
             plan.watcher.note(&Note::TopologyChanged {
                 step,
@@ -379,7 +381,6 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
                 now,
             });
         }
-        self.topology = topology.or(self.topology);
         Ok(())
     }
 }

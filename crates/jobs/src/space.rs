@@ -77,9 +77,8 @@ impl Presentation<3> for Space {
         Ok(scene.render([PIXELS; 2])?)
     }
 
-    fn topology(&self, u: &Stored<3>, eps: f64) -> Result<Topology> {
-        let (closed, _) = ClosedMesh::new(surfaces::phase_field_surface(u, eps)?)?;
-        Ok(Topology::of(&closed))
+    fn topology(&self, u: &Stored<3>) -> Result<Topology> {
+        Ok(surfaces::phase_field_topology(u)?.into())
     }
 
     fn encode(&self, u: &Stored<3>, eps: f64, format: &str) -> Result<Vec<u8>> {

@@ -58,7 +58,7 @@ impl Steps {
         self.stage.start()
     }
 
-    /// [`Note::TopologyChanged`], if parts or holes have come or gone since the last call or the beginning. A shape that touches itself has none.
+    /// [`Note::TopologyChanged`], if parts or holes have come or gone since the last call or the beginning.
     pub fn change(&mut self) -> Option<Note> {
         let now = self.stage.topology()?;
         let before = self.before.replace(now).filter(|before| *before != now)?;
@@ -200,8 +200,7 @@ where
         if !has_interface(u) {
             return None;
         }
-        let eps = self.run.case().scales.eps;
-        self.plan.presentation.topology(u, eps).ok()
+        self.plan.presentation.topology(u).ok()
     }
 
     fn touches_box(&self) -> bool {

@@ -1,10 +1,8 @@
 //! Zero level sets of fields as closed triangle meshes.
 
-use std::collections::HashMap;
-
 use geometry::{PhaseField, check_values, distances_from_phase_field};
-use rayon::prelude::*;
 
+use crate::tetrahedra::{Lattice, LevelSet, Node, Scaled, Values, march};
 use crate::vector::Vector;
 use crate::{Error, TriangleMesh};
 
@@ -43,9 +41,11 @@ pub fn phase_field_surface(u: &impl PhaseField<3>, eps: f64) -> Result<TriangleM
 pub fn isosurface(s: &impl PhaseField<3>) -> Result<TriangleMesh, Error> {
     s.check_finite()?;
     let grid = s.nodes().grid();
-    marched(&Lattice {
-        size: grid.shape(),
-        value_at: &|place| s.at(place),
+    marched(&Geometry {
+        lattice: Lattice {
+            size: grid.shape(),
+            values: &Scaled(s, 1.0),
+        },
         origin: grid.origin(),
         spacing: [grid.side(), grid.cells() as f64],
     })
@@ -58,111 +58,89 @@ pub fn isosurface(s: &impl PhaseField<3>) -> Result<TriangleMesh, Error> {
 /// [`geometry::Error::ValueCount`], [`geometry::Error::NonFinite`]; [`Error::TooLarge`].
 pub fn lattice_surface(size: [usize; 3], values: &[f64]) -> Result<TriangleMesh, Error> {
     check_values(values, size.iter().product())?;
-    marched(&Lattice {
-        size,
-        value_at: &|[i, j, k]| values[(i * size[1] + j) * size[2] + k],
+    marched(&Geometry {
+        lattice: Lattice {
+            size,
+            values: &Rows { size, values },
+        },
         origin: [0.0; 3],
         spacing: [1.0; 2],
     })
 }
 
-fn marched(lattice: &Lattice<'_>) -> Result<TriangleMesh, Error> {
-    let mut surface = Surface {
-        lattice,
-        vertex_of: HashMap::new(),
+struct Rows<'a> {
+    size: [usize; 3],
+    values: &'a [f64],
+}
+
+impl Rows<'_> {
+    fn start(&self, [i, j]: [usize; 2]) -> usize {
+        (i * self.size[1] + j) * self.size[2]
+    }
+}
+
+impl Values for Rows<'_> {
+    fn at(&self, [i, j, k]: [usize; 3]) -> f64 {
+        self.values[self.start([i, j]) + k]
+    }
+
+    fn read_row(&self, place: [usize; 2], row: &mut [f64]) {
+        row.copy_from_slice(&self.values[self.start(place)..][..row.len()]);
+    }
+}
+
+fn marched(geometry: &Geometry<'_>) -> Result<TriangleMesh, Error> {
+    let mut mesh = Mesh {
+        geometry,
         vertices: Vec::new(),
         normals: Vec::new(),
         faces: Vec::new(),
     };
-    for cell in lattice.mixed_cells() {
-        // The corner whose index is odd along the axes with a bit.
-        let corner = |bits: usize| -> Node {
-            let is_odd = |axis: usize| bits >> axis & 1;
-            std::array::from_fn(|axis| cell[axis] + ((cell[axis] % 2) ^ is_odd(axis)))
-        };
-        let reflected = cell.iter().map(|c| c % 2).sum::<usize>() % 2 == 1;
-        for (corners, positive) in TETRAHEDRA {
-            surface.cut(corners.map(corner), positive != reflected);
-        }
-    }
-    surface.finish()
+    march(&geometry.lattice, &mut mesh)?;
+    Ok(TriangleMesh {
+        vertices: mesh.vertices,
+        faces: mesh.faces,
+        normals: Some(mesh.normals),
+    })
 }
 
-/// Indices of a node, counted from one: 0 and one more than the last are the layers outside.
-type Node = [usize; 3];
+/// The mesh as it grows.
+struct Mesh<'a> {
+    geometry: &'a Geometry<'a>,
+    vertices: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    faces: Vec<[u32; 3]>,
+}
+
+impl LevelSet for Mesh<'_> {
+    fn add_vertex(&mut self, [p, q]: [Node; 2]) {
+        // From the corner with more even indices: the same in all tetrahedra around the edge.
+        let odd = |node: Node| node.iter().filter(|&i| i % 2 == 1).count();
+        let (a, b) = if odd(p) < odd(q) { (p, q) } else { (q, p) };
+        let (position, normal) = self.geometry.crossing(a, b);
+        self.vertices.push(position.to_array());
+        self.normals.push(normal.to_array());
+    }
+
+    fn add_face(&mut self, vertices: [u32; 3]) {
+        self.faces.push(vertices);
+    }
+}
 
 /// Vertices keep this part of the length of their edge from its ends.
 const CLEARANCE: f64 = 1.0 / 1024.0;
 
-/// The nodes with a layer of outside around them.
-struct Lattice<'a> {
-    size: [usize; 3],
-    value_at: &'a (dyn Fn([usize; 3]) -> f64 + Sync),
+/// A lattice in space.
+struct Geometry<'a> {
+    lattice: Lattice<'a>,
     origin: [f64; 3],
     /// So many nodes along each axis are so long: length and number.
     spacing: [f64; 2],
 }
 
-impl Lattice<'_> {
-    fn layers(&self) -> [usize; 3] {
-        self.size.map(|n| n + 2)
-    }
-
-    fn index(&self, [i, j, k]: Node) -> usize {
-        let [_, rows, columns] = self.layers();
-        (i * rows + j) * columns + k
-    }
-
-    fn is_inside(&self, node: Node) -> bool {
-        self.value(node.map(|i| i as isize))
-            .is_some_and(|value| value < 0.0)
-    }
-
-    /// Which nodes of a layer of the first axis are inside.
-    fn inside(&self, i: usize) -> Vec<bool> {
-        let [_, rows, columns] = self.layers();
-        let mut inside = vec![false; rows * columns];
-        if (1..=self.size[0]).contains(&i) {
-            for j in 1..rows - 1 {
-                for k in 1..columns - 1 {
-                    inside[j * columns + k] = (self.value_at)([i - 1, j - 1, k - 1]) < 0.0;
-                }
-            }
-        }
-        inside
-    }
-
-    /// First corners of the cells with corners on both sides, in order.
-    fn mixed_cells(&self) -> Vec<Node> {
-        let [layers, rows, columns] = self.layers();
-        let of_layer = |i: usize| {
-            let (layers, mut mixed) = ([i, i + 1].map(|i| self.inside(i)), Vec::new());
-            for j in 0..rows - 1 {
-                let row = |di: usize, dj: usize| &layers[di][(j + dj) * columns..][..columns];
-                let rows = [row(0, 0), row(0, 1), row(1, 0), row(1, 1)];
-                let column = |k: usize| rows.iter().map(|row| u8::from(row[k])).sum::<u8>();
-                let mut left = column(0);
-                for k in 0..columns - 1 {
-                    let right = column(k + 1);
-                    if !matches!(left + right, 0 | 8) {
-                        mixed.push([i, j, k]);
-                    }
-                    left = right;
-                }
-            }
-            mixed
-        };
-        let by_layer: Vec<Vec<Node>> = (0..layers - 1).into_par_iter().map(of_layer).collect();
-        by_layer.concat()
-    }
-
-    /// The value at a node, `None` outside the grid.
+impl Geometry<'_> {
     fn value(&self, node: [isize; 3]) -> Option<f64> {
-        let mut place = [0; 3];
-        for (axis, i) in node.into_iter().enumerate() {
-            place[axis] = (usize::try_from(i - 1).ok()).filter(|&i| i < self.size[axis])?;
-        }
-        Some((self.value_at)(place))
+        self.lattice.value(node)
     }
 
     fn position(&self, node: Node) -> Vector {
@@ -214,7 +192,11 @@ impl Lattice<'_> {
             (None, _) => (1.0 - CLEARANCE, Vector::ZERO),
         };
         let (xa, xb) = (self.position(a), self.position(b));
-        let outwards = if self.is_inside(a) { xb - xa } else { xa - xb };
+        let outwards = if self.lattice.is_inside(a) {
+            xb - xa
+        } else {
+            xa - xb
+        };
         let normal = gradient
             .try_normalize()
             .unwrap_or_else(|| outwards.normalize());
@@ -246,90 +228,5 @@ fn root(va: f64, vb: f64, bend: f64) -> f64 {
         -2.0 * c / (b + slope)
     } else {
         (slope - b) / (2.0 * a)
-    }
-}
-
-/// The tetrahedra of a cell: their corners on a way along its edges to the opposite corner, with a bit for every axis, and whether they
-/// are positively oriented in that order.
-const TETRAHEDRA: [([usize; 4], bool); 6] = [
-    ([0, 1, 3, 7], true),
-    ([0, 2, 6, 7], true),
-    ([0, 4, 5, 7], true),
-    ([0, 1, 5, 7], false),
-    ([0, 4, 6, 7], false),
-    ([0, 2, 3, 7], false),
-];
-
-/// The mesh as it grows.
-struct Surface<'a> {
-    lattice: &'a Lattice<'a>,
-    /// The vertex on the edge between two nodes.
-    vertex_of: HashMap<[usize; 2], u32>,
-    vertices: Vec<[f64; 3]>,
-    normals: Vec<[f64; 3]>,
-    faces: Vec<[u32; 3]>,
-}
-
-impl Surface<'_> {
-    /// Adds the surface in a tetrahedron; `positive` is its orientation.
-    fn cut(&mut self, corners: [Node; 4], positive: bool) {
-        let inside = corners.map(|node| self.lattice.is_inside(node));
-        let where_is = |side: bool| (0..4).filter(move |&c| inside[c] == side);
-        match where_is(true).count() {
-            1 | 3 => {
-                // One corner alone, and the others in order: an odd place is an odd permutation.
-                let minority = where_is(true).count() == 1;
-                let alone = where_is(minority).next().expect("there is one");
-                let mut edges = where_is(!minority).map(|other| [alone, other]);
-                let triangle = [(); 3].map(|()| edges.next().expect("there are three"));
-                let outwards = (positive == (alone % 2 == 0)) == minority;
-                let triangle = triangle.map(|edge| self.vertex(edge.map(|c| corners[c])));
-                self.push(triangle, outwards);
-            }
-            2 => {
-                let mut order = where_is(true).chain(where_is(false));
-                let [a, b, c, d] = [(); 4].map(|()| order.next().expect("there are four"));
-                // Inversions of the order (a, b, c, d).
-                let outwards = positive == ((a + b - 1) % 2 == 0);
-                let quadrilateral = [[a, c], [a, d], [b, d], [b, c]];
-                let [p, q, r, s] = quadrilateral.map(|edge| self.vertex(edge.map(|c| corners[c])));
-                self.push([p, q, r], outwards);
-                self.push([p, r, s], outwards);
-            }
-            _ => {}
-        }
-    }
-
-    fn push(&mut self, [a, b, c]: [u32; 3], outwards: bool) {
-        self.faces
-            .push(if outwards { [a, b, c] } else { [a, c, b] });
-    }
-
-    fn vertex(&mut self, [p, q]: [Node; 2]) -> u32 {
-        // From the corner with more even indices: the same in all tetrahedra around the edge.
-        let odd = |node: Node| node.iter().filter(|&i| i % 2 == 1).count();
-        let (a, b) = if odd(p) < odd(q) { (p, q) } else { (q, p) };
-        let key = [self.lattice.index(a), self.lattice.index(b)];
-        *self.vertex_of.entry(key).or_insert_with(|| {
-            let (position, normal) = self.lattice.crossing(a, b);
-            self.vertices.push(position.to_array());
-            self.normals.push(normal.to_array());
-            // Wraps if there are too many, which `finish` sees.
-            self.vertices.len() as u32 - 1
-        })
-    }
-
-    fn finish(self) -> Result<TriangleMesh, Error> {
-        if u32::try_from(self.vertices.len()).is_err() {
-            return Err(Error::TooLarge {
-                elements: "vertices",
-                count: self.vertices.len(),
-            });
-        }
-        Ok(TriangleMesh {
-            vertices: self.vertices,
-            faces: self.faces,
-            normals: Some(self.normals),
-        })
     }
 }

@@ -9,8 +9,8 @@ use geometry::shapes::{Ball, Cuboid, Torus};
 use geometry::{Field, Grid, PhaseField, SignedDistance, SignedDistanceExt, Stored, phase_field};
 use proptest::prelude::*;
 use surfaces::{
-    ClosedMesh, Error, MeshDistance, isosurface, lattice_surface, phase_field_surface,
-    remeshed_surface, samples,
+    ClosedMesh, Error, MeshDistance, Topology, isosurface, lattice_surface, phase_field_surface,
+    phase_field_topology, remeshed_surface, samples,
 };
 
 fn surface(grid: Grid<3>, shape: &impl SignedDistance<3>) -> ClosedMesh {
@@ -278,8 +278,13 @@ proptest! {
         let waves = waves(seed);
         let s = Field::from_fn(grid, |x| rounded(waves(x), levels));
         let mesh = isosurface(&s).unwrap();
-        if !mesh.faces.is_empty() {
+        let topology = phase_field_topology(&s.map(|s| -s)).unwrap();
+        if mesh.faces.is_empty() {
+            prop_assert_eq!(topology, Topology { components: 0, euler_characteristic: 0 });
+        } else {
             let mesh = closed(mesh);
+            prop_assert_eq!(topology.components, mesh.components());
+            prop_assert_eq!(topology.euler_characteristic, mesh.euler_characteristic());
             prop_assert!(mesh.volume() > 0.0);
             prop_assert!(mesh.euler_characteristic() % 2 == 0);
             // Nodes are inside if they were: the surface separates them.
@@ -365,6 +370,9 @@ fn surfaces_of_what_is_stored_are_the_same() {
             phase_field_surface(&u, eps),
         ];
         let [few, all] = marched.map(Result::unwrap);
+        let topology = phase_field_topology(&stored).unwrap();
+        assert_eq!(topology, phase_field_topology(&u).unwrap());
+        assert_eq!(topology.components, closed(few.clone()).components());
         assert_eq!(
             (few.vertices, few.normals, few.faces),
             (all.vertices, all.normals, all.faces)

@@ -154,7 +154,7 @@ impl<const D: usize> Layer<D> {
     /// Gradients of the distance variable at the nodes of the layer, which the volume does not need.
     pub(super) fn gradients(&self) -> &[[f64; D]] {
         self.gradients
-            .get_or_init(|| self.map(|place| self.gradient(place)))
+            .get_or_init(|| self.table([0.0; D], |place| self.gradient(place)))
     }
 
     /// Fills `nodes` and `places`.
@@ -198,12 +198,19 @@ impl<const D: usize> Layer<D> {
     /// The neighbours of the nodes of the layer. Not to be called first in a loop on all cores: all of them make
     /// the table, and one that waits for another inside the loop may take up work that waits for the table.
     pub(super) fn around(&self) -> &[Around<D>] {
-        let place_of = |neighbour: Lookup| match neighbour {
-            Lookup::Stored(node) => self.places[node],
-            Lookup::Pure { .. } => NOWHERE,
-        };
+        let nowhere = [[NOWHERE; NEIGHBOURS]; D];
         self.around
-            .get_or_init(|| self.map(|place| self.by_axis(place, |along| along.map(place_of))))
+            .get_or_init(|| self.table(nowhere, |place| self.around_place(place)))
+    }
+
+    /// The neighbours of one of them, for those who need them once.
+    pub(super) fn around_place(&self, place: usize) -> Around<D> {
+        self.by_axis(place, |along| {
+            along.map(|neighbour| match neighbour {
+                Lookup::Stored(node) => self.places[node],
+                Lookup::Pure { .. } => NOWHERE,
+            })
+        })
     }
 
     /// The gradient of the distance variable: `sum_k w_k (d_k - d_-k) / h` along each axis.
@@ -265,6 +272,14 @@ impl<const D: usize> Layer<D> {
         parallel::map(self.nodes.len(), SHARE, &f)
     }
 
+    fn table<T: Copy + Send + Sync>(
+        &self,
+        first: T,
+        f: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        parallel::table(self.nodes.len(), SHARE, first, &f)
+    }
+
     /// Area or volume of the inside.
     pub(super) fn volume(&self) -> f64 {
         let inside = |node: usize| {
@@ -298,6 +313,6 @@ impl<const D: usize> Layer<D> {
             let length = vector::norm(gradients[place]).max(f64::MIN_POSITIVE);
             vector::scale(gradients[place], length.recip())
         };
-        self.normals.get_or_init(|| self.map(unit))
+        self.normals.get_or_init(|| self.table([0.0; D], unit))
     }
 }
