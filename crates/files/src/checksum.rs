@@ -1,17 +1,17 @@
-//! Checksums of files and of what is in them.
+//! Checksums of files and of what is in them, by instructions of the processor where it has them.
 
 use std::io::{self, Write};
 
-use hmac_sha256::Hash;
+use sha2::Digest as _;
 
 /// The SHA-256 (FIPS 180-4) of everything that is written to it.
 #[derive(Clone, Default)]
-pub struct Sha256(Hash);
+pub struct Sha256(sha2::Sha256);
 
 impl Sha256 {
     /// The checksum of some bytes.
     pub fn of(bytes: impl AsRef<[u8]>) -> [u8; 32] {
-        Hash::hash(bytes.as_ref())
+        sha2::Sha256::digest(bytes).into()
     }
 
     /// Adds some bytes.
@@ -21,7 +21,7 @@ impl Sha256 {
 
     /// The checksum.
     pub fn finish(self) -> [u8; 32] {
-        self.0.finalize()
+        self.0.finalize().into()
     }
 }
 

@@ -41,6 +41,20 @@ impl Triangle {
         near.map(|weight| weight / sum)
     }
 
+    /// The rows, of so many, that hold points with half-integer coordinates which may be in the triangle.
+    pub fn rows(&self, rows: Range<usize>) -> Range<usize> {
+        self.range(1, rows)
+    }
+
+    fn range(&self, axis: usize, within: Range<usize>) -> Range<usize> {
+        let [a, b, c] = self.corners.map(|corner| corner[axis]);
+        let [low, high] = [a.min(b).min(c) - 0.5, a.max(b).max(c) + 0.5];
+        // Casts cut off what is behind the point and saturate: what is far outside leaves an empty range.
+        let before = low as usize;
+        let first = before.saturating_add(usize::from((before as f64) < low));
+        first.max(within.start)..(high as usize).min(within.end)
+    }
+
     /// Visits the points with half-integer coordinates in the triangle, in these columns and rows:
     /// column, row, third number.
     pub fn scan(
@@ -49,15 +63,9 @@ impl Triangle {
         rows: Range<usize>,
         mut visit: impl FnMut(usize, usize, f64),
     ) {
-        let range = |axis: usize, from: usize, to: usize| {
-            let values = self.corners.map(|corner| corner[axis]);
-            let low = values.into_iter().fold(f64::INFINITY, f64::min) - 0.5;
-            let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max) + 0.5;
-            // Casts saturate: what is far outside leaves an empty range.
-            (low.ceil().max(0.0) as usize).max(from)..(high.floor().max(0.0) as usize).min(to)
-        };
-        let [x, y] = [range(0, 0, columns), range(1, rows.start, rows.end)];
-        if self.area == 0.0 || !self.area.is_finite() {
+        let (x, y) = (self.range(0, 0..columns), self.rows(rows));
+        // Most triangles of a fine mesh are smaller than a pixel.
+        if x.is_empty() || y.is_empty() || self.area == 0.0 || !self.area.is_finite() {
             return;
         }
         let [a, b, c] = self.corners;

@@ -235,21 +235,40 @@ impl Drawing<'_> {
     fn pixels(&self) -> Vec<[u8; 4]> {
         let [width, height] = self.size;
         let mut pixels = vec![[0; 4]; width * height];
-        let bands = pixels.par_chunks_mut(BAND * width).enumerate();
-        bands.for_each(|(band, pixels)| self.band(BAND * band, pixels));
+        let triangles = self.triangles_of_bands();
+        let bands = pixels.par_chunks_mut(BAND * width).zip(triangles);
+        bands.enumerate().for_each(|(band, (pixels, triangles))| {
+            self.band(BAND * band, &triangles, pixels);
+        });
         pixels
     }
 
+    /// The triangles that may be seen in each band.
+    fn triangles_of_bands(&self) -> Vec<Vec<usize>> {
+        let [_, height] = self.size;
+        let samples = self.per_side * BAND;
+        let mut bands = vec![Vec::new(); height.div_ceil(BAND)];
+        for (index, triangle) in self.triangles.iter().enumerate() {
+            let rows = triangle.rows(0..self.per_side * height);
+            if !rows.is_empty() {
+                for band in &mut bands[rows.start / samples..=(rows.end - 1) / samples] {
+                    band.push(index);
+                }
+            }
+        }
+        bands
+    }
+
     /// Some whole rows.
-    fn band(&self, first: usize, pixels: &mut [[u8; 4]]) {
+    fn band(&self, first: usize, triangles: &[usize], pixels: &mut [[u8; 4]]) {
         let per_side = self.per_side;
         let columns = per_side * self.size[0];
         let from = per_side * first;
         let rows = per_side * (pixels.len() / self.size[0]);
         // What is nearest, and how near.
         let mut samples = vec![(0.0, usize::MAX); columns * rows];
-        for (index, triangle) in self.triangles.iter().enumerate() {
-            triangle.scan(columns, from..from + rows, |x, y, near| {
+        for &index in triangles {
+            self.triangles[index].scan(columns, from..from + rows, |x, y, near| {
                 let sample = &mut samples[(y - from) * columns + x];
                 if near > sample.0 {
                     *sample = (near, index);
