@@ -1,6 +1,6 @@
 //! What became of a surface, and how far it has gone.
 
-use render::View;
+use render::{Quality, View};
 use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 use surfaces::hausdorff_distance;
 
@@ -143,7 +143,9 @@ impl Displacement {
                 viridis(length / largest)
             }
         });
-        let scene = Scene::of_mesh(self.mesh.clone()).view(View::from_front_left(self.up));
+        // It shows numbers; `final.png` is the picture of the shape.
+        let scene = Scene::of_mesh(self.mesh.clone()).quality(Quality::Draft);
+        let scene = scene.view(View::from_front_left(self.up));
         let picture = scene.painted(colours.collect())?.render([PIXELS; 2])?;
         let count = self.lost.iter().filter(|lost| **lost).count();
         let caption = match count {

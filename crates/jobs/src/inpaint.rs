@@ -18,6 +18,8 @@ impl InpaintOptions {
 
     pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
         let mut reader = self.input.reader(&self.operator, device, watcher)?;
+        // The mask may open the shape far from its surface.
+        reader.takes_bricks = false;
         let loaded = reader.load()?;
         let mask = self.mask.as_ref().ok_or(Refusal::NoMask)?;
         Ok(match loaded {

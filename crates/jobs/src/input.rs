@@ -265,6 +265,8 @@ pub struct Reader<'a> {
     pub allows_loss: Option<bool>,
     /// The flow that will store the whole grid, if one will, and where: its memory is looked at before anything takes long.
     pub whole: Option<(DeviceKind, Flow)>,
+    /// Whether the flow takes bricks near the surface where they are less than half of the grid, and what is elsewhere does not count.
+    pub takes_bricks: bool,
     options: &'a mut InputOptions,
     /// The cells per unit length that were chosen, if any; the options may hold others that are tried.
     chosen: Option<usize>,
@@ -296,6 +298,7 @@ impl<'a> Reader<'a> {
             source,
             allows_loss: None,
             whole: None,
+            takes_bricks: false,
             chosen: options.cells,
             options,
             eps_over_h,
@@ -666,7 +669,14 @@ impl<'a> Reader<'a> {
         let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
         let progress = self.watcher.begins("signed distance", grid.cells() as u64);
         let layer_done = || progress.advance();
-        let distance = distance.sample_within(PURE_BEYOND * eps, grid, &layer_done)?;
+        let reach = PURE_BEYOND * eps;
+        let distance = if self.takes_bricks {
+            // Bricks are stored if a cell in them is so near to one beside the surface.
+            let near = solver::BRICK_REACH * eps + 2.0 * grid.spacing();
+            distance.sample_near(near, reach, grid, &layer_done)?
+        } else {
+            distance.sample_within(reach, grid, &layer_done)?
+        };
         drop(progress);
         let (distance, nodes) = surfaces::mend_signs(distance);
         if nodes > 0 {

@@ -83,6 +83,7 @@ impl InputOptions {
         let mut reader = Reader::of(self, operator.eps_over_h(), watcher)?;
         let is_dense = operator.storage == Some(Storage::Dense);
         reader.whole = is_dense.then_some((device, Flow::Willmore));
+        reader.takes_bricks = !is_dense;
         Ok(reader)
     }
 }
@@ -217,6 +218,7 @@ impl<'a> Session<'a> {
             Job::Mcf(mcf) => {
                 let mut reader = mcf.input.reader(&mcf.operator, kind, watcher)?;
                 reader.whole = Some((kind, Flow::MeanCurvature));
+                reader.takes_bricks = false;
                 reader.load()
             }
             Job::Flow(flow) => flow.input.reader(&flow.operator, kind, watcher)?.load(),

@@ -8,7 +8,7 @@ use crate::{DeviceField, Error};
 
 /// Bricks nearer to the interface than this are active, in units of `eps`: the phase field ends where it differs from the pure phases by
 /// `1e-5`, which changes a flow by a millionth of its motion.
-const REACH: f64 = 8.0;
+pub const REACH: f64 = 8.0;
 /// When the interface has come nearer to the edge than this, the set is too small.
 const MARGIN: f64 = 5.0;
 /// Nodes are worked on in pieces of this many.

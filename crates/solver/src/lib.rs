@@ -78,6 +78,7 @@ mod state;
 mod stepper;
 mod times;
 
+pub use bricks::REACH as BRICK_REACH;
 pub use constraints::Constraints;
 pub use displacement::widths_between;
 pub use domain::{Domain, DomainScales};

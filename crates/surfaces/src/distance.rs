@@ -107,10 +107,43 @@ impl MeshDistance {
         grid: Grid<3>,
         part_done: &(dyn Fn() + Sync),
     ) -> Result<Stored<3>, Error> {
-        let Some(bricks) = self.bricks_within(reach, &grid) else {
-            let all = self.sample(grid, part_done)?;
-            return Ok(Stored::whole(all.map(|s| s.clamp(-reach, reach))));
-        };
+        match self.bricks_within(reach, &grid) {
+            Some(bricks) => self.sample_bricks(bricks, grid, reach, part_done),
+            None => {
+                let all = self.sample(grid, part_done)?;
+                Ok(Stored::whole(all.map(|s| s.clamp(-reach, reach))))
+            }
+        }
+    }
+
+    /// The same, for somebody who needs distances within `near` only, if these take less than half of the grid: only they are stored, with the
+    /// rest of their bricks. Elsewhere the distance is `reach`, on either side.
+    ///
+    /// # Errors
+    /// As [`Self::sample`].
+    pub fn sample_near(
+        &self,
+        near: f64,
+        reach: f64,
+        grid: Grid<3>,
+        part_done: &(dyn Fn() + Sync),
+    ) -> Result<Stored<3>, Error> {
+        match self.bricks_within(near, &grid) {
+            Some(bricks) if 2 * bricks.len() < grid.len() => {
+                self.sample_bricks(bricks, grid, reach, part_done)
+            }
+            _ => self.sample_within(reach, grid, part_done),
+        }
+    }
+
+    /// The distances in bricks, cut off beyond `reach`.
+    fn sample_bricks(
+        &self,
+        bricks: Bricks<3>,
+        grid: Grid<3>,
+        reach: f64,
+        part_done: &(dyn Fn() + Sync),
+    ) -> Result<Stored<3>, Error> {
         let mut values = vec![0.0; bricks.len()];
         let part = bricks.places().len().div_ceil(grid.cells()).max(1) * bricks.volume();
         let parts = values.par_chunks_mut(part).enumerate();

@@ -203,6 +203,19 @@ fn sampling_is_the_distance_at_every_node() {
         for (a, b) in within.field().unwrap().values().iter().zip(direct.values()) {
             assert!((a - b.clamp(-reach, reach)).abs() < 1e-15, "{a} for {b}");
         }
+        // Near the surface all is as it was, and elsewhere on the same side.
+        let near = distance.sample_near(0.01, reach, grid, &|| ()).unwrap();
+        assert!(2 * near.values().len() < grid.len());
+        let (near, within) = (near.field().unwrap(), within.field().unwrap());
+        for (a, b) in near.values().iter().zip(within.values()) {
+            assert!(
+                a == b || b.abs() > 0.01 && *a == reach.copysign(*b),
+                "{a} for {b}"
+            );
+        }
+        // Half of the grid and more is stored as ever.
+        let wide = distance.sample_near(0.3, reach, grid, &|| ()).unwrap();
+        assert_eq!(wide.field().unwrap(), within);
     }
     let far = grid.with_origin([1e200; 3]).unwrap();
     let distance = MeshDistance::new(&closed(cube(0.5)));
