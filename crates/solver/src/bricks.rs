@@ -151,7 +151,7 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
-    parallel::filter_map(u.len(), CHUNK, &|node| {
+    let changes_beside = |node: usize| {
         let place = nodes.multi_index(node);
         let positive = u[node] > 0.0;
         let changes = (0..D).any(|axis| {
@@ -162,5 +162,39 @@ fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
             })
         });
         changes.then_some(place)
+    };
+    let Some(bricks) = nodes.bricks() else {
+        return parallel::filter_map(u.len(), CHUNK, &changes_beside);
+    };
+    let (volume, mixed) = (bricks.volume(), mixed_bricks(bricks, u));
+    parallel::filter_map(mixed.len() * volume, CHUNK, &|index| {
+        changes_beside(mixed[index / volume] * volume + index % volume)
     })
+}
+
+/// The numbers of the bricks that hold nodes beside which `u` may change its sign: those of one sign with others of that sign around them do not.
+fn mixed_bricks<const D: usize>(bricks: &Bricks<D>, u: &[f64]) -> Vec<usize> {
+    let volume = bricks.volume();
+    let sign = |brick: usize| -> Option<bool> {
+        let values = &u[brick * volume..][..volume];
+        let positive = values.iter().filter(|u| **u > 0.0).count();
+        (positive == 0 || positive == volume).then_some(positive > 0)
+    };
+    let signs = parallel::map(bricks.places().len(), 1, &sign);
+    let beside = |place: [usize; D]| match bricks.number(place) {
+        Some(number) => signs[number],
+        None => Some(bricks.is_positive(place)),
+    };
+    let is_mixed = |brick: &usize| {
+        let place = bricks.places()[*brick];
+        signs[*brick].is_none()
+            || (0..D).any(|axis| {
+                [1, bricks.per_axis() - 1].into_iter().any(|step| {
+                    let mut next = place;
+                    next[axis] = (next[axis] + step) % bricks.per_axis();
+                    beside(next) != signs[*brick]
+                })
+            })
+    };
+    (0..signs.len()).filter(is_mixed).collect()
 }

@@ -3,11 +3,16 @@
 //! Where the profile is `tanh(3 d / (4 eps))`, `atanh u` is the distance `d` in units of `4 eps / 3`, and the difference of two
 //! phase fields in that variable is the displacement of the interface between them.
 
+use std::sync::LazyLock;
+
 use geometry::Stored;
 
 /// Values nearer to the pure phases than this are taken for it: behind small radii phase fields overshoot them, and there a
 /// displacement means nothing.
 const PURE: f64 = 1e-3;
+
+/// The depths of both pure phases, which most nodes have.
+static PURE_DEPTHS: LazyLock<[f64; 2]> = LazyLock::new(|| [PURE - 1.0, 1.0 - PURE].map(f64::atanh));
 
 fn clipped(u: f64) -> f64 {
     u.clamp(PURE - 1.0, 1.0 - PURE)
@@ -15,6 +20,9 @@ fn clipped(u: f64) -> f64 {
 
 /// `atanh u`, the distance inside the interface in units of `4 eps / 3`.
 pub(crate) fn depth(u: f64) -> f64 {
+    if u.abs() >= 1.0 - PURE {
+        return PURE_DEPTHS[usize::from(u > 0.0)];
+    }
     clipped(u).atanh()
 }
 
@@ -95,6 +103,14 @@ mod tests {
             assert!((displaced(u, shift) - v).abs() < 1e-14);
             assert!((displacement(v, u) - shift).abs() < 1e-13);
         }
+    }
+
+    #[test]
+    fn depths_end_with_those_of_the_pure_phases() {
+        for u in [-2.0, -1.0, PURE - 1.0, -0.9, 0.0, 0.9, 1.0 - PURE, 1.0, 1.1] {
+            assert!(depth(u).total_cmp(&clipped(u).atanh()).is_eq(), "{u}");
+        }
+        assert!(depth(f64::NAN).is_nan());
     }
 
     #[test]

@@ -9,6 +9,8 @@ pub(crate) const MOST_CORNERS: usize = 8;
 const CHUNK: usize = 1 << 14;
 /// Where the distance to the interface changes less than this per unit length, there is no normal.
 const FLAT: f64 = 1e-3;
+/// Nodes beside those of the interface have this part of `1 - u^2` at least where the profile is the optimal one.
+const BESIDE: f64 = 0.2;
 
 /// A grid node of the interface.
 pub(crate) struct Sample<const D: usize> {
@@ -102,6 +104,14 @@ impl<const D: usize> Samples<D> {
             window,
             points: Grid::new(cells, grid.side()).ok()?,
             width: grid.cells() as f64 / cells as f64,
+            distances: parallel::values(u.len(), |node| {
+                let counts = 1.0 - u[node] * u[node] >= BESIDE * window;
+                if counts {
+                    distance(u[node], eps)
+                } else {
+                    f64::NAN
+                }
+            }),
         };
         let mut samples: Vec<Sample<D>> = parallel::filter_map(u.len(), CHUNK, &|node| {
             let moves = region.is_none_or(|region| region[node]);
@@ -192,11 +202,22 @@ struct Lattice<'a, const D: usize> {
     points: Grid<D>,
     /// Grid cells per lattice cell.
     width: f64,
+    /// The distances from the interface of nodes near it, NaN of others.
+    distances: Vec<f64>,
+}
+
+fn distance(u: f64, eps: f64) -> f64 {
+    -4.0 / 3.0 * eps * u.clamp(-0.999_999, 0.999_999).atanh()
 }
 
 impl<const D: usize> Lattice<'_, D> {
-    fn distance(&self, u: f64) -> f64 {
-        -4.0 / 3.0 * self.eps * u.clamp(-0.999_999, 0.999_999).atanh()
+    fn distance(&self, node: usize, u: &[f64]) -> f64 {
+        let known = self.distances[node];
+        if known.is_nan() {
+            distance(u[node], self.eps)
+        } else {
+            known
+        }
     }
 
     /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
@@ -207,12 +228,12 @@ impl<const D: usize> Lattice<'_, D> {
         }
         let spacing = self.grid.spacing();
         let index = nodes.multi_index(node);
-        let here = self.distance(u[node]);
+        let here = self.distance(node, u);
         let mut laplacian = 0.0;
         let mut normal = [0.0; D];
         for (axis, normal) in normal.iter_mut().enumerate() {
             let [before, after] = nodes.along(node, index, axis, [-1, 1]);
-            let at = |node: usize| self.distance(u[node]);
+            let at = |node: usize| self.distance(node, u);
             let (after, before) = (at(after.stored()?), at(before.stored()?));
             laplacian += after - 2.0 * here + before;
             *normal = after - before;
