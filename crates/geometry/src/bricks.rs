@@ -237,7 +237,7 @@ impl<const D: usize> Bricks<D> {
 
     /// The stored cell at a multi-index of the grid, or the phase where no brick is active.
     pub(crate) fn at(&self, index: [usize; D]) -> Lookup {
-        let brick = index.map(|at| at >> self.bits);
+        let brick = self.holder(index);
         let Some(number) = self.number(brick) else {
             return self.pure(brick);
         };
@@ -245,6 +245,15 @@ impl<const D: usize> Bricks<D> {
             .into_iter()
             .fold(0, |flat, at| (flat << self.bits) + self.within(at));
         Lookup::Stored(number * self.volume() + inside)
+    }
+
+    /// The place of the brick that holds a multi-index of the grid.
+    fn holder(&self, mut index: [usize; D]) -> [usize; D] {
+        // Not by the `map` of an array, which is a call in the innermost loops.
+        for at in &mut index {
+            *at >>= self.bits;
+        }
+        index
     }
 
     /// The phase of a brick that is not active.
@@ -281,18 +290,19 @@ impl<const D: usize> Bricks<D> {
             let mut ends = steps.iter().map(|step| within + step);
             ends.any(|end| if forward { end >= side } else { end < 0 })
         };
-        let [before, after] = [false, true].map(|forward| {
+        let beside = |forward: bool| {
             if !leaves(forward) {
                 return Lookup::Stored(cell);
             }
-            let brick = self.shifted(place.map(|at| at >> self.bits), axis, forward);
+            let brick = self.shifted(self.holder(place), axis, forward);
             match self.number(brick) {
                 Some(number) => {
                     Lookup::Stored(number * self.volume() + (cell & (self.volume() - 1)))
                 }
                 None => self.pure(brick),
             }
-        });
+        };
+        let (before, after) = (beside(false), beside(true));
         let mut cells = [Lookup::Stored(cell); N];
         for (found, step) in cells.iter_mut().zip(steps) {
             let (from, step) = match within + step {

@@ -133,8 +133,8 @@ impl<const D: usize> Stored<D> {
             parallel::filter_map(nodes.len(), CHUNK, &|node| {
                 let [next] = nodes.along(node, nodes.multi_index(node), axis, [1]);
                 let next = next.stored()?;
-                let [a, b] = [node, next].map(|k| other.values[k]);
-                let [c, d] = [node, next].map(|k| own.values[k]);
+                let (a, b) = (other.values[node], other.values[next]);
+                let (c, d) = (own.values[node], own.values[next]);
                 ((a > 0.0) != (b > 0.0)).then(|| c + (d - c) * a / (a - b))
             })
         };
