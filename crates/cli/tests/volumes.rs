@@ -102,6 +102,136 @@ fn a_ball_of_voxels_becomes_a_ball_of_their_volume() {
     }
 }
 
+/// Balls in one mask, by their centres and radii in voxels: smoothing moved volume from the small ones to the large one, and lost the smallest.
+const BALLS: [([f64; 3], f64); 6] = [
+    ([22.0, 25.0, 25.0], 15.0),
+    ([50.0, 25.0, 25.0], 8.0),
+    ([70.0, 25.0, 25.0], 5.0),
+    ([80.0, 25.0, 25.0], 3.0),
+    ([88.0, 25.0, 25.0], 2.0),
+    ([95.0, 25.0, 25.0], 1.5),
+];
+
+/// Writes the balls, off the centres of the voxels, and counts the voxels of each.
+fn write_balls(path: &Path) -> [f64; 6] {
+    let size = [110, 50, 50];
+    let voxels = (0..size.iter().product::<usize>())
+        .map(|v| [v % 110, v / 110 % 50, v / 5500].map(|i| i as f64 - 0.3));
+    let within = |x: [f64; 3], (centre, radius)| ball(x, centre, radius);
+    let labels = voxels
+        .clone()
+        .map(|x| u8::from(BALLS.iter().any(|&b| within(x, b))));
+    let volume = Volume::of_labels(size, [0.0; 3], [1.0; 3], labels.collect()).unwrap();
+    volumes::write(path, &volume).unwrap();
+    BALLS.map(|ball| voxels.clone().filter(|&x| within(x, ball)).count() as f64)
+}
+
+/// Every part has the volume of its voxels and its place, also those that the grid does not hold, which are told.
+#[test]
+fn every_part_keeps_its_own_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    let counts = write_balls(&folder.path().join("balls.nii.gz"));
+    let sample = [
+        "sample",
+        "balls.nii.gz",
+        "--cells",
+        "96",
+        "--save",
+        "start.ply",
+    ];
+    assert!(run(folder.path(), &sample).status.success());
+    let fair = [
+        "fair",
+        "balls.nii.gz",
+        "--cells",
+        "96",
+        "--save",
+        "balls.ply",
+    ];
+    let options = ["--output", "run"];
+    let output = run(folder.path(), &[&fair[..], &options].concat());
+    let told = text(&output.stderr);
+    for part in [
+        "3 parts or holes are too small for the grid",
+        "115.00 at 80.3",
+        "11.000 at 95.1",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    for (file, shift) in [("start.ply", 0.12), ("balls.ply", 0.12)] {
+        let mesh = closed(&folder.path().join(file));
+        let parts = mesh.parts();
+        let volumes = parts.volumes(mesh.mesh());
+        assert_eq!(volumes.len(), 6, "{file}");
+        let places = parts.centroids(mesh.mesh());
+        for (ball, count) in BALLS.iter().zip(counts) {
+            let far = |place: &[f64; 3]| (place[0] - ball.0[0] - 0.3).abs();
+            let found = (0..6).min_by(|&a, &b| far(&places[a]).total_cmp(&far(&places[b])));
+            let found = found.unwrap();
+            assert!(
+                (volumes[found] / count - 1.0).abs() < 1e-5,
+                "{file}, {count}: {volumes:?}"
+            );
+            assert!(far(&places[found]) < shift, "{file}, {count}: {places:?}");
+        }
+    }
+    let outcome: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let parts = outcome["mesh"]["parts"].as_array().unwrap();
+    let fates = parts.iter().map(|part| part["fate"].as_str().unwrap());
+    let fates: Vec<&str> = fates.collect();
+    assert_eq!(fates, [["smoothed"; 3], ["too_small"; 3]].concat());
+    for (part, count) in parts.iter().zip(counts) {
+        for volume in ["volume_before", "volume_after"] {
+            assert!((number(part, volume) / count - 1.0).abs() < 1e-5, "{part}");
+        }
+    }
+    assert_eq!(outcome["components"], 6);
+    let page = std::fs::read_to_string(folder.path().join("run/index.html")).unwrap();
+    assert!(page.contains("too small for the grid: as it was between its voxels"));
+}
+
+/// A tube of this radius along the first axis, with a ball of three times the radius beside it.
+fn vessel_with_sac(x: [f64; 3]) -> bool {
+    let tube = (x[1] - 9.2).hypot(x[2] - 18.4 - 1.5 * (x[0] / 6.0).sin()) < 3.0;
+    (tube && (1.0..36.0).contains(&x[0])) || ball(x, [18.4, 18.7, 18.2], 8.0)
+}
+
+/// Not only all of a body keeps its volume, but each place: a vessel does not lose to its sac.
+#[test]
+fn every_place_keeps_its_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    let volume = write(&folder.path().join("sac.nii.gz"), |x| {
+        u8::from(vessel_with_sac(x))
+    });
+    let options = ["--cells", "64", "--save", "sac.ply", "--output", "run"];
+    let ended = outcome(
+        folder.path(),
+        &[&["fair", "sac.nii.gz"][..], &options].concat(),
+    );
+    assert!(
+        number(&ended["mesh"], "volume_change_percent").abs() < 1e-5,
+        "{ended}"
+    );
+    let mesh = closed(&folder.path().join("sac.ply"));
+    let place = mesh.parts().centroids(mesh.mesh())[0];
+    let voxels = (0..38 * 38 * 38_usize).map(|v| [v % 38, v / 38 % 38, v / (38 * 38)]);
+    let inside: Vec<_> = voxels.filter(|&index| volume.value(index) > 0.5).collect();
+    for axis in 0..3 {
+        let mean = inside.iter().map(|index| index[axis] as f64).sum::<f64>() / inside.len() as f64;
+        let shift = (place[axis] - ORIGIN[axis]) / SIDE - mean;
+        assert!(shift.abs() < 0.02, "{axis}: {shift}");
+    }
+    // The volume of one end of the vessel, by cubes of a third of a voxel whose centres are inside.
+    let distance = surfaces::MeshDistance::new(&mesh);
+    let cubes = (0..27 * 114 * 114_usize).map(|c| [c % 27, c / 27 % 114, c / (27 * 114)]);
+    let centres = cubes
+        .map(|cube| [0, 1, 2].map(|axis| ORIGIN[axis] + SIDE * (cube[axis] as f64 - 1.0) / 3.0));
+    let distances = distance.signed_distances(&centres.collect::<Vec<_>>());
+    let found = distances.iter().filter(|s| **s < 0.0).count() as f64 / 27.0;
+    let expected = inside.iter().filter(|index| index[0] < 9).count() as f64;
+    assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+}
+
 /// Fairs a noisy sphere with its volume kept; the volume of its zero set over that of the mesh.
 fn fair_noisy_sphere(options: &[&str]) -> f64 {
     let folder = tempfile::tempdir().unwrap();

@@ -3,8 +3,10 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use pages::five_digits;
 use runs::Interrupt;
 
+use crate::parts::PartReport;
 use crate::presentation::Topology;
 
 /// What looks after a job. By default nothing is told, and nothing interrupts it.
@@ -88,13 +90,10 @@ pub enum Warning {
         /// How many.
         nodes: usize,
     },
-    /// Small parts or holes of a segmentation are left out.
-    Specks {
-        /// How many.
-        count: usize,
-        /// The change of the number of voxels inside.
-        filled: isize,
-    },
+    /// Small parts or holes of a segmentation are left out, as noise.
+    Specks(Vec<volumes::Speck>),
+    /// Parts of a segmentation are too small for the grid, and stay as they are.
+    SmallParts(Vec<PartReport>),
     /// The estimated noise of a mesh may be its edges.
     Flat {
         /// The part of the vertices that lie in a plane with those around them.
@@ -238,9 +237,13 @@ impl fmt::Display for Warning {
                 f,
                 "the mesh crosses itself: {nodes} nodes of the grid, which its faces put on the wrong side, were put right"
             ),
-            Self::Specks { count, filled } => write!(
+            Self::Specks(specks) => LeftOut(specks).fmt(f),
+            Self::SmallParts(parts) => write!(
                 f,
-                "{count} parts or holes of a few voxels are left out, which changes the volume by {filled:+} voxels"
+                "{} parts or holes are too small for the grid, which more `cells` make finer: they stay as they are between the voxels, with their \
+                 volumes: {}",
+                parts.len(),
+                listed(parts, PartReport::found_at)
             ),
             Self::Flat { part } => write!(
                 f,
@@ -264,6 +267,35 @@ impl fmt::Display for Warning {
                 f.write_str("nothing is saved to the file of `save`: the shape has vanished")
             }
         }
+    }
+}
+
+/// How many parts are listed.
+const LISTED: usize = 10;
+
+/// The first of some parts, and that there are others.
+fn listed<T>(parts: &[T], each: impl Fn(&T) -> String) -> String {
+    let first = parts.iter().take(LISTED).map(each);
+    let rest = (parts.len() > LISTED).then(|| "and others".to_owned());
+    first.chain(rest).collect::<Vec<_>>().join("; ")
+}
+
+/// Parts and holes that are left out.
+struct LeftOut<'a>(&'a [volumes::Speck]);
+
+impl fmt::Display for LeftOut<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let filled: isize = self.0.iter().map(|speck| speck.filled).sum();
+        let each = |speck: &volumes::Speck| {
+            let [x, y, z] = speck.place.map(five_digits);
+            format!("{:+} at {x}, {y}, {z}", speck.filled)
+        };
+        let list = listed(self.0, each);
+        write!(
+            f,
+            "{} parts or holes of a few voxels are left out, which changes the volume by {filled:+} voxels: {list}",
+            self.0.len()
+        )
     }
 }
 

@@ -57,12 +57,13 @@ impl FairOptions {
                 return Err(Error::foreign(given, "", what));
             }
             Source::Volume(_) => {
-                let mut loaded = reader.load()?;
                 let willmore = &mut self.willmore;
                 // That of the voxels is kept.
                 if willmore.reduced_volume.is_none() {
                     willmore.volume.get_or_insert(SizeTarget::Keep);
                 }
+                reader.keeps_volumes = willmore.volume == Some(SizeTarget::Keep);
+                let mut loaded = reader.load()?;
                 if let Loaded::Space(start) = &mut loaded
                     && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !ends)
                 {

@@ -5,6 +5,7 @@ use report::{Axis, Figure, LineChart, OKABE_ITO, Raster, Rgb, Series, viridis};
 use surfaces::hausdorff_distance;
 
 use crate::made::Surface;
+use crate::parts::PartReport;
 use crate::prelude::*;
 
 const PIXELS: u32 = 640;
@@ -84,6 +85,9 @@ pub struct MeshReport {
     /// The part of the vertices that could not follow the flow, in percent; none for a new mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_behind_percent: Option<f64>,
+    /// The parts of a segmentation whose parts keep their volumes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartReport>,
 }
 
 impl MeshReport {

@@ -10,10 +10,11 @@ use crate::events::{GridDistance, Loss, ThinParts};
 use crate::file::{File, Input};
 use crate::options::{FieldKind, InputOptions, Inside};
 use crate::own::{OwnMesh, thinnest};
+use crate::parts::Voxels;
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{Presentation, Topology};
-use crate::space::{Space, Voxels};
+use crate::space::Space;
 use crate::volume;
 
 /// What a run starts from.
@@ -263,6 +264,8 @@ pub struct Reader<'a> {
     pub source: Source,
     /// Whether thin parts may be lost on the grid, if there is an option that says so.
     pub allows_loss: Option<bool>,
+    /// Whether the parts of a segmentation keep their volumes, and small ones do not flow.
+    pub keeps_volumes: bool,
     /// The flow that will store the whole grid, if one will, and where: its memory is looked at before anything takes long.
     pub whole: Option<(DeviceKind, Flow)>,
     /// Whether the flow takes bricks near the surface where they are less than half of the grid, and what is elsewhere does not count.
@@ -297,6 +300,7 @@ impl<'a> Reader<'a> {
         Ok(Self {
             source,
             allows_loss: None,
+            keeps_volumes: false,
             whole: None,
             takes_bricks: false,
             chosen: options.cells,
@@ -412,23 +416,15 @@ impl<'a> Reader<'a> {
         vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
-        let (field, surface, found) = self.first_good(grids, |reader| {
+        let (field, surface) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
             let field = reader.mesh_field(mesh, grid)?;
             let surface = surfaces::phase_field_surface(&field, reader.eps(&grid))?;
             let surface = ClosedMesh::new(surface).ok().map(|(surface, _)| surface);
             let found = surface.as_ref().map(Topology::of);
-            Ok(((field, surface, found), found == Some(wanted)))
+            Ok(((field, surface), found == Some(wanted)))
         })?;
-        if found != Some(wanted) {
-            let loss = Loss {
-                cells: self.cells(),
-                thinnest: thinnest(field.grid()),
-                longest_side: mesh.bounding_box().longest_side(),
-                of_mesh: wanted,
-                on_grid: found.unwrap_or_default(),
-                distance: far_from(mesh, surface.as_ref(), &field),
-            };
+        if let Some(loss) = self.loss(mesh, &field, surface.as_ref()) {
             if refuses {
                 return Err(Error::Lost {
                     loss: Box::new(loss),
@@ -439,6 +435,24 @@ impl<'a> Reader<'a> {
             self.watcher.warning(&Warning::Lost(loss));
         }
         Ok((field, surface))
+    }
+
+    /// The parts and holes of a mesh that its surface on the grid does not have.
+    fn loss(
+        &self,
+        mesh: &ClosedMesh,
+        field: &Stored<3>,
+        surface: Option<&ClosedMesh>,
+    ) -> Option<Loss> {
+        let (wanted, found) = (Topology::of(mesh), surface.map(Topology::of));
+        (found != Some(wanted)).then(|| Loss {
+            cells: self.cells(),
+            thinnest: thinnest(field.grid()),
+            longest_side: mesh.bounding_box().longest_side(),
+            of_mesh: wanted,
+            on_grid: found.unwrap_or_default(),
+            distance: far_from(mesh, surface, field),
+        })
     }
 
     fn cells(&self) -> usize {
@@ -645,21 +659,26 @@ impl<'a> Reader<'a> {
                 cells: self.cells(),
             });
         }
-        let field = self.mesh_field(&body.surface, grid)?;
-        let voxels = Some(Voxels {
-            volume: body.surface.volume(),
-            side: body.voxel,
-            farthest: None,
-            time: None,
-        });
-        if body.specks > 0 {
-            self.watcher.warning(&Warning::Specks {
-                count: body.specks,
-                filled: body.filled,
-            });
+        if !body.specks.is_empty() {
+            self.watcher.warning(&Warning::Specks(body.specks));
+        }
+        let mut voxels = Voxels::new(body.surface.clone(), body.voxel);
+        if self.keeps_volumes {
+            voxels.keeps_volumes = true;
+            let small = voxels.leave_small_parts(self.eps(&grid));
+            if !small.is_empty() {
+                self.watcher.warning(&Warning::SmallParts(small));
+            }
+        }
+        let flowing = voxels.flowing();
+        let field = self.mesh_field(&flowing, grid)?;
+        let marched = surfaces::phase_field_surface(&field, self.eps(&grid))?;
+        let marched = ClosedMesh::new(marched).ok().map(|(marched, _)| marched);
+        if let Some(loss) = self.loss(&flowing, &field, marched.as_ref()) {
+            self.watcher.warning(&Warning::Lost(loss));
         }
         let space = Space {
-            voxels,
+            voxels: Some(voxels),
             ..Space::default()
         };
         Ok(Loaded::Space(self.start(field, space)?))

@@ -45,6 +45,7 @@ mod options;
 mod outcome;
 mod own;
 mod page;
+mod parts;
 pub mod paths;
 mod plane;
 mod prelude;
@@ -80,6 +81,7 @@ pub use options::{
 };
 pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
+pub use parts::{PartFate, PartReport};
 pub use presentation::Topology;
 pub use refusal::Refusal;
 pub use sample::sample;

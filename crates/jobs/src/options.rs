@@ -288,7 +288,8 @@ pub struct WillmoreOptions {
     /// In 3D, hold or change the volume: keep, a VALUE, or PERCENT such as 90% [default: keep for `fair` of a segmentation]
     ///
     /// A value is in the units of the input. A percentage is relative to the volume at the beginning. For a segmentation, the volume at the
-    /// beginning is that of its voxels. Specks do not count: parts and holes of a few voxels, which are left out.
+    /// beginning is that of its voxels. Specks do not count: parts and holes of a few voxels, which are left out. With keep, each part of a segmentation
+    /// keeps its own volume.
     #[arg(long, value_name = "TARGET", help_heading = SIZES)]
     pub volume: Option<SizeTarget>,
 

@@ -6,6 +6,7 @@ use engine::Helfrich;
 use pages::five_digits;
 
 use crate::faired::MeshReport;
+use crate::parts::{PartFate, PartReport};
 use crate::prelude::*;
 
 /// Measures whose change is told.
@@ -150,13 +151,14 @@ impl Summary {
         self.measures.get(name).copied().flatten()
     }
 
-    /// Energy, sizes, and how far the surface has moved, each in a sentence, and then what may have gone wrong.
+    /// Energy, sizes, how far the surface has moved and what became of its parts, each in a sentence, and then what may have gone wrong.
     pub fn sentences(&self) -> Vec<String> {
         let mut text = Vec::new();
         text.extend(self.of_energy());
         text.extend(self.of_time());
         text.extend(self.of_sizes());
         text.extend(self.mesh.as_ref().map(of_mesh));
+        text.extend(self.mesh.iter().flat_map(|mesh| of_parts(&mesh.parts)));
         text.extend(self.doubts().into_iter().map(str::to_owned));
         text
     }
@@ -253,4 +255,31 @@ fn of_mesh(mesh: &MeshReport) -> String {
         mesh.displacement_rms_percent,
         mesh.displacement_largest_percent,
     )
+}
+
+/// What became of the parts of a segmentation, if there are several.
+fn of_parts(parts: &[PartReport]) -> Vec<String> {
+    let of = |fate: PartFate| parts.iter().filter(move |part| part.fate == fate);
+    let mut text = Vec::new();
+    let changes = parts.iter().filter_map(PartReport::change_percent);
+    let largest = changes.map(f64::abs).fold(0.0, f64::max);
+    if parts.len() > 1 {
+        text.push(format!(
+            "{} parts and cavities, whose volumes have changed by {largest:.4} % at most",
+            parts.len()
+        ));
+    }
+    for (fate, what) in [
+        (
+            PartFate::Restored,
+            "vanished in the flow, and is in the mesh as the surface between its voxels",
+        ),
+        (
+            PartFate::Joined,
+            "is one with others, which have the volume of all together",
+        ),
+    ] {
+        text.extend(of(fate).map(|part| format!("a part, {}, {what}", part.found_at())));
+    }
+    text
 }

@@ -15,6 +15,7 @@ use report::{Axis, LineChart, Marker, Series};
 
 use crate::notes::RunNotes;
 use crate::outcome::{self, Summary};
+use crate::parts::PartReport;
 use crate::paths::MESHES;
 use crate::prelude::*;
 use crate::space::Space;
@@ -58,6 +59,10 @@ impl Files<'_> {
         if let Some(shape) = self.shape()? {
             page = page.with(shape);
         }
+        let parts = (outcome.iter().flat_map(|outcome| &outcome.mesh)).flat_map(|mesh| &mesh.parts);
+        if let Some(parts) = table_of_parts(&parts.collect::<Vec<_>>())? {
+            page = page.with(parts);
+        }
         if !self.records.is_empty() {
             page = page.with(self.steps()?);
         }
@@ -66,6 +71,9 @@ impl Files<'_> {
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
             let dimension = engine::dimension(self.run)?;
+            let mut outcome = outcome.clone();
+            // These are in a table of their own.
+            outcome.mesh.iter_mut().for_each(|mesh| mesh.parts.clear());
             numbers.push(words::numbers(&outcome.to_json(), dimension));
         }
         let options = words::options(&options, &about.command);
@@ -225,6 +233,44 @@ impl Files<'_> {
         let bytes = self.has(name).then(|| self.run.read(name));
         Ok(bytes.transpose()?)
     }
+}
+
+/// The largest parts of a segmentation with their volumes before and after, if there are some.
+fn table_of_parts(parts: &[&PartReport]) -> Result<Option<Section>> {
+    if parts.is_empty() {
+        return Ok(None);
+    }
+    let mut largest = parts.to_vec();
+    largest.sort_by(|a, b| b.volume_before.abs().total_cmp(&a.volume_before.abs()));
+    largest.truncate(MOST_ROWS);
+    let head = [
+        "place",
+        "volume before",
+        "volume after",
+        "change, %",
+        "what became of it",
+    ];
+    let rows = largest.iter().map(|part| {
+        let volume = |volume: Option<f64>| volume.map_or(String::new(), five_digits);
+        let change = part.change_percent();
+        [
+            part.place.map(five_digits).join(", "),
+            volume(Some(part.volume_before)),
+            volume(part.volume_after),
+            change.map_or(String::new(), |change| format!("{change:+.4}")),
+            part.fate.to_string(),
+        ]
+    });
+    let note = format!(
+        "The largest {} of {} parts and cavities of the segmentation, in the units of the input. The place is the centre of mass. The volume of a \
+         cavity is negative.",
+        largest.len(),
+        parts.len()
+    );
+    let table = TableElement::new("Parts", head, rows)?;
+    Ok(Some(
+        Section::new("Parts").with(markdown(&note)).with(table),
+    ))
 }
 
 /// Pictures of the first and of the last surface, which together fill them.

@@ -44,7 +44,13 @@ pub fn sample(mut options: SampleOptions, watcher: &dyn Watcher) -> Result<()> {
         let up = options.up.map_or_else(|| from.up_axis(), Ok)?;
         return Ok(surfaces::write_with_up(&path, &mesh, up)?);
     }
-    match reader.load()? {
+    let mut loaded = reader.load()?;
+    if let Loaded::Space(start) = &mut loaded
+        && let Some(voxels) = &mut start.presentation.voxels
+    {
+        voxels.keeps_volumes = options.without.is_empty();
+    }
+    match loaded {
         Loaded::Plane(start) => write(start, options, &path)?,
         Loaded::Space(mut start) if noise > 0.0 => {
             start.presentation.turn(&mut options.up)?;

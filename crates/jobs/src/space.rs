@@ -6,6 +6,7 @@ use render::View;
 use crate::faired::{Faired, surface};
 use crate::made::{Shape, Surface, encoded};
 use crate::own::OwnMesh;
+use crate::parts::Voxels;
 use crate::paths::MESHES;
 use crate::prelude::*;
 use crate::presentation::{Known, Presentation, Topology};
@@ -25,22 +26,11 @@ pub struct Space {
     pub voxels: Option<Voxels>,
 }
 
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub struct Voxels {
-    pub volume: f64,
-    /// The side of a cube as large as a voxel.
-    pub side: f64,
-    /// How far its surface may go, root of the mean square, and for how long, if that ends the flow.
-    pub farthest: Option<f64>,
-    #[serde(default)]
-    pub time: Option<f64>,
-}
-
 impl Space {
     /// Whether what is taken off is noise, or the staircase of voxels, so that there is no growth to leave room for.
     fn hardly_moves(&self) -> bool {
-        let ends_early = |voxels: Voxels| voxels.farthest.is_some();
-        self.own.is_some() || self.voxels.is_some_and(ends_early)
+        let ends_early = |voxels: &Voxels| voxels.farthest.is_some();
+        self.own.is_some() || self.voxels.as_ref().is_some_and(ends_early)
     }
 }
 
@@ -78,11 +68,17 @@ impl Presentation<3> for Space {
     }
 
     fn topology(&self, u: &Stored<3>) -> Result<Topology> {
-        Ok(surfaces::phase_field_topology(u)?.into())
+        let flowing = surfaces::phase_field_topology(u)?.into();
+        let voxels = self.voxels.as_ref();
+        Ok(voxels.map_or(flowing, |voxels| voxels.with_small_parts(flowing)))
     }
 
     fn encode(&self, u: &Stored<3>, eps: f64, format: &str) -> Result<Vec<u8>> {
-        encoded(&surface(u, eps)?, self.up, format)
+        let mesh = match &self.voxels {
+            Some(voxels) => voxels.made(u, eps)?.0,
+            None => surface(u, eps)?,
+        };
+        encoded(&mesh, self.up, format)
     }
 
     fn shape(&self, u: &Stored<3>, eps: f64, faired: Option<Faired>) -> Result<Shape> {
@@ -100,11 +96,11 @@ impl Presentation<3> for Space {
         if let Some(own) = &self.own {
             return own.faired(start, u, eps, self.up).map(Some);
         }
+        if let Some(voxels) = &self.voxels {
+            return voxels.faired(u, eps, self.up).map(Some);
+        }
         // Sheets that touch each other are no surface from which another one could be far; triangles cut off what is round.
-        let volume = match self.voxels {
-            Some(voxels) => voxels.volume,
-            None => ZeroSet::of(start, eps)?.volume,
-        };
+        let volume = ZeroSet::of(start, eps)?.volume;
         let before = surfaces::phase_field_surface(start, eps)?;
         match ClosedMesh::new(before.with_volume(volume, |_| true)) {
             Ok((before, _)) if before.volume() > 0.0 => {
@@ -133,10 +129,16 @@ impl Presentation<3> for Space {
     }
 
     fn inputs(&self) -> Result<Vec<(String, Vec<u8>)>> {
-        Ok(self.own.as_ref().map_or(Vec::new(), OwnMesh::inputs))
+        let mut inputs = self.own.as_ref().map_or(Vec::new(), OwnMesh::inputs);
+        let voxels = self.voxels.as_ref().map(Voxels::input);
+        inputs.extend(voxels.transpose()?);
+        Ok(inputs)
     }
 
     fn restore(&mut self, stored: &StoredRun) -> Result<()> {
+        if let Some(voxels) = &mut self.voxels {
+            voxels.load_from(stored)?;
+        }
         let own = self.own.as_mut();
         own.map_or(Ok(()), |own| own.load_from(stored))
     }

@@ -25,6 +25,8 @@ pub struct MeshDistance {
     hierarchy: Hierarchy,
     /// The vertices of the triangles of the hierarchy.
     faces: Vec<[u32; 3]>,
+    /// The faces of the mesh that they are.
+    order: Vec<usize>,
     /// Sums of the unit normals of all faces there, weighted by their angles at vertices.
     vertex_normals: Vec<Vector>,
     edge_normals: HashMap<Edge, Vector>,
@@ -67,6 +69,7 @@ impl MeshDistance {
         Self {
             hierarchy,
             faces: order.iter().map(|&f| faces[f]).collect(),
+            order,
             vertex_normals,
             edge_normals,
             scale,
@@ -209,6 +212,18 @@ impl MeshDistance {
             |place| distances[flat(place)] < 0.0,
         )
         .ok()
+    }
+
+    /// The nearest face of the mesh to each of many points, in parallel; of several the same one as for the distance.
+    ///
+    /// # Panics
+    /// Points so far away that squares of distances overflow.
+    pub fn nearest_faces(&self, points: &[[f64; 3]]) -> Vec<usize> {
+        let nearest = |&x: &[f64; 3]| {
+            let (_, face) = self.distance_near(Vector::from_array(x), None);
+            self.order[face.expect("a face is nearest")]
+        };
+        points.par_iter().map(nearest).collect()
     }
 
     /// The distances of many points, in parallel.

@@ -1,7 +1,7 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
-use crate::TriangleMesh;
 use crate::vector::Vector;
+use crate::{Parts, TriangleMesh};
 
 /// Rounds in which the squares of noise are averaged over neighbours, some forty of them,
 const AVERAGING: usize = 12;
@@ -148,12 +148,13 @@ impl TriangleMesh {
     }
 
     /// The closed surface as small as it becomes in some rounds in which every vertex moves halfway to the middle of its neighbours, then
-    /// all of them along their normals so that it encloses `volume`, and none further from where it was than `shortened` allows, which
-    /// says of a vertex and its way how much of it may be gone. In the end it encloses `volume`.
+    /// those of each part along their normals so that it encloses its volume, and none further from where it was than `shortened` allows,
+    /// which says of a vertex and its way how much of it may be gone. In the end each part encloses its volume.
     pub fn relaxed(
         &self,
         rounds: usize,
-        volume: f64,
+        parts: &Parts,
+        volumes: &[f64],
         shortened: impl Fn(usize, [f64; 3]) -> f64,
     ) -> Self {
         let (umbrellas, original) = (Umbrellas::of(self), self.points());
@@ -161,14 +162,14 @@ impl TriangleMesh {
         for _ in 0..rounds {
             let mut x = moved.points();
             umbrellas.smooth(&mut x, 1, [0.5, 0.0]);
-            let mut x = self.on(&x).towards_volume(volume, |_| true).points();
+            let mut x = self.on(&x).towards_volumes(parts, volumes).points();
             for (vertex, (x, &from)) in x.iter_mut().zip(&original).enumerate() {
                 let way = *x - from;
                 *x = from + shortened(vertex, way.to_array()) * way;
             }
             moved = self.on(&x);
         }
-        moved.with_volume(volume, |_| true)
+        moved.with_volumes(parts, volumes)
     }
 
     /// The derivative of the enclosed volume for velocities of the vertices.
@@ -192,7 +193,7 @@ impl TriangleMesh {
         edges.sum::<f64>() / (3 * self.faces.len()).max(1) as f64
     }
 
-    fn moved_by(&self, offset: &[Vector]) -> Self {
+    pub(crate) fn moved_by(&self, offset: &[Vector]) -> Self {
         let pairs = self.points().into_iter().zip(offset);
         self.on(&pairs.map(|(x, &by)| x + by).collect::<Vec<_>>())
     }

@@ -343,7 +343,10 @@ fn relaxed_surfaces_keep_their_volume_and_their_place() {
     });
     let rough = isosurface(&steps).unwrap();
     let (reach, volume) = (0.5 / 32.0, 0.11);
-    let smooth = rough.relaxed(20, volume, |_, way| (reach / length(way)).min(1.0));
+    let parts = closed(rough.clone()).parts();
+    let smooth = rough.relaxed(20, &parts, &[volume], |_, way| {
+        (reach / length(way)).min(1.0)
+    });
     let [before, after] = [rough.clone(), smooth.clone()].map(closed);
     assert!((after.volume() / volume - 1.0).abs() < 1e-12);
     assert!(after.area() < 0.9 * before.area());

@@ -7,6 +7,7 @@ mod fairing;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod parts;
 mod remeshing;
 mod repairing;
 mod shapes;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use derive_more::Display;
 use glam::DVec3;
-use surfaces::{ClosedMesh, TriangleMesh, lattice_surface};
+use surfaces::{Cells, ClosedMesh, Filling, Parts, TriangleMesh, lattice_surface};
 
 use crate::volume::label_tolerance;
 use crate::{Error, Volume};
@@ -19,6 +19,8 @@ const ROUNDS: usize = 30;
 const REACHES: [f64; 3] = [0.9, 0.45, 0.0];
 /// Parts whose surface, by marching tetrahedra, encloses fewer voxels are specks.
 const SPECK: f64 = 8.0;
+/// Waves that are longer than some five times so many voxels are those of the voxels.
+const LONG: f64 = 3.0;
 
 /// Which voxels are inside.
 #[derive(Clone, Copy, Debug, PartialEq, Display)]
@@ -47,10 +49,17 @@ pub struct Body {
     pub surface: ClosedMesh,
     /// The side of a cube as large as a voxel.
     pub voxel: f64,
-    /// How many parts and holes are left out,
-    pub specks: usize,
-    /// and how many voxels this adds: those of the holes, less those of the parts.
+    /// The parts and holes that are left out.
+    pub specks: Vec<Speck>,
+}
+
+/// A part or hole of few voxels that is left out of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speck {
+    /// How many voxels leaving it out adds: those of a hole, or less those of a part.
     pub filled: isize,
+    /// Its centre of mass.
+    pub place: [f64; 3],
 }
 
 impl Volume {
@@ -92,44 +101,75 @@ impl Volume {
     /// that are not a number.
     ///
     /// The surface of labels is that by marching tetrahedra without its steps, which tell of the voxels and not of the body: vertices
-    /// move towards the middle of their neighbours again and again while the volume stays that of the voxels, but each stays
-    /// between the centres of the voxels whose difference put it there. (S. F. F. Gibson: Constrained elastic surface nets. MICCAI 1998.)
-    /// A body of few voxels across becomes thinner by up to a voxel where others are thick. Parts and holes inside whose surface there are
-    /// fewer than eight voxels are taken for noise and left out, if there are larger ones: their voxels do not count.
+    /// move towards the middle of their neighbours again and again while every part and cavity keeps the volume of its voxels, but each
+    /// vertex stays between the centres of the voxels whose difference put it there. (S. F. F. Gibson: Constrained elastic surface nets.
+    /// MICCAI 1998.) This makes places thinner that bend more. So each place gets the volume of its voxels back, on the average over three
+    /// voxels ([`TriangleMesh::with_filling`]). Parts and holes inside whose surface there are fewer than eight voxels are taken for noise
+    /// and left out, if there are larger ones: their voxels do not count.
     pub fn body(&self, inside: Inside) -> Result<Body, Error> {
         let part = Part::of(self, inside)?;
         let (lattice, _) = ClosedMesh::new(part.surface(self, inside)?)?;
-        let cell = self.voxel_volume();
-        let voxel = cell.cbrt();
+        let voxel = self.voxel_volume().cbrt();
         let Inside::Label(_) = inside else {
             return Ok(Body {
                 surface: ClosedMesh::new(self.placed(lattice.mesh()))?.0,
                 voxel,
-                specks: 0,
-                filled: 0,
+                specks: Vec::new(),
             });
         };
         let large = lattice.without_small_parts(SPECK)?;
-        let voxels = self.voxels_within(large.mesh(), inside);
+        let specks = if large.components() < lattice.components() {
+            self.specks(&lattice, inside)
+        } else {
+            Vec::new()
+        };
         Ok(Body {
-            surface: self.without_steps(large.mesh(), voxels * cell)?,
+            surface: self.without_steps(&large, inside)?,
             voxel,
-            specks: lattice.components() - large.components(),
-            filled: voxels as isize - part.count as isize,
+            specks,
         })
     }
 
-    /// The number of voxels within parts of the surface of a label. That has a vertex half-way between two voxels of a row of which one is
-    /// inside: the voxels of a row are the sum of these places, those where the surface is entered taken as negative.
-    fn voxels_within(&self, parts: &TriangleMesh, inside: Inside) -> f64 {
-        let between = |x: &&[f64; 3]| x.map(is_half) == [false, false, true];
-        let place = |x: &[f64; 3]| {
-            let before = [x[0].round(), x[1].round(), x[2].floor()];
-            let sign = self.depth(before.map(|v| v as isize), inside).signum();
-            sign * x[2]
+    /// The small parts of a surface in voxels.
+    fn specks(&self, lattice: &ClosedMesh, inside: Inside) -> Vec<Speck> {
+        let (parts, mesh) = (lattice.parts(), lattice.mesh());
+        let voxels = self.voxels_within(mesh, &parts, inside).into_iter();
+        let all = voxels.zip(parts.volumes(mesh)).zip(parts.centroids(mesh));
+        let small = all.filter(|((_, volume), _)| volume.abs() < SPECK);
+        let speck = |((voxels, _), centre): ((f64, f64), [f64; 3])| Speck {
+            filled: -voxels as isize,
+            place: self.position(centre),
         };
-        let places = parts.vertices.iter().filter(between).map(place);
-        places.sum::<f64>().round()
+        small.map(speck).collect()
+    }
+
+    /// Where the surface of a label crosses rows of voxels along the last axis: there it has a vertex half-way between two voxels of which one is
+    /// inside. The voxel before it, and whether that is the one.
+    fn crossings(
+        &self,
+        lattice: &TriangleMesh,
+        inside: Inside,
+    ) -> impl Iterator<Item = (usize, [i64; 3], bool)> {
+        let between = |x: &[f64; 3]| x.map(is_half) == [false, false, true];
+        let vertices = lattice.vertices.iter().enumerate();
+        vertices
+            .filter(move |(_, x)| between(x))
+            .map(move |(vertex, x)| {
+                let before = [x[0].round(), x[1].round(), x[2].floor()].map(|v| v as isize);
+                let is_inside = self.depth(before, inside) > 0.0;
+                (vertex, before.map(|i| i as i64), is_inside)
+            })
+    }
+
+    /// The number of voxels within each part of the surface of a label: the sum of the places where it crosses rows of voxels, those where rows
+    /// enter it taken as negative.
+    fn voxels_within(&self, lattice: &TriangleMesh, parts: &Parts, inside: Inside) -> Vec<f64> {
+        let mut voxels = vec![0.0; parts.count()];
+        for (vertex, before, is_inside) in self.crossings(lattice, inside) {
+            let place = before[2] as f64 + 0.5;
+            voxels[parts.of_vertices()[vertex] as usize] += if is_inside { place } else { -place };
+        }
+        voxels
     }
 
     /// Positive inside and negative outside, also outside of the volume.
@@ -186,19 +226,28 @@ impl Volume {
         }
     }
 
-    fn without_steps(&self, lattice: &TriangleMesh, volume: f64) -> Result<ClosedMesh, Error> {
-        let mesh = self.placed(lattice);
+    /// The surface of a label, from that in voxels.
+    fn without_steps(&self, lattice: &ClosedMesh, inside: Inside) -> Result<ClosedMesh, Error> {
+        let (parts, marched) = (lattice.parts(), lattice.mesh());
+        let voxels = self.voxels_within(marched, &parts, inside).into_iter();
+        let volumes: Vec<f64> = voxels.map(|count| count * self.voxel_volume()).collect();
+        let rows = self.crossings(marched, inside);
+        let filling = Filling::of_rows(self.cells(), rows.map(|(_, cell, ends)| (cell, ends)));
+        let width = LONG * self.voxel_volume().cbrt();
+        let mesh = self.placed(marched);
         let to_voxels = self.frame.matrix3.inverse();
         // A vertex is in the middle of an edge along one axis or more, where its coordinates are halves.
         let halves = |x: &[f64; 3]| x.iter().filter(|v| is_half(**v)).count();
-        let to_centres: Vec<f64> = (lattice.vertices.iter())
+        let to_centres: Vec<f64> = (marched.vertices.iter())
             .map(|x| 0.5 * (halves(x) as f64).sqrt())
             .collect();
         let relaxed = |reach: f64| {
-            mesh.relaxed(ROUNDS, volume, |vertex, way| {
+            let relaxed = mesh.relaxed(ROUNDS, &parts, &volumes, |vertex, way| {
                 (reach * to_centres[vertex] / (to_voxels * DVec3::from_array(way)).length())
                     .min(1.0)
-            })
+            });
+            let filled = relaxed.with_filling(&filling, width);
+            filled.with_volumes(&parts, &volumes)
         };
         let mut surfaces = REACHES
             .into_iter()
@@ -207,6 +256,12 @@ impl Volume {
             Some((surface, _)) => Ok(surface),
             None => Ok(ClosedMesh::new(mesh)?.0),
         }
+    }
+
+    /// The voxels as cells.
+    fn cells(&self) -> Cells {
+        let [a, b, c] = self.frame.matrix3.to_cols_array_2d();
+        Cells::new(self.position([0.0; 3]), [a, b, c])
     }
 }
 
@@ -221,23 +276,20 @@ struct Part {
     first: [isize; 3],
     /// and the number of voxels up to the last one, with the margin.
     size: [usize; 3],
-    /// Voxels inside.
-    count: usize,
 }
 
 impl Part {
     fn of(volume: &Volume, inside: Inside) -> Result<Self, Error> {
-        let (mut low, mut high, mut count) = ([usize::MAX; 3], [0; 3], 0);
+        let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
         let found = volume.values().enumerate();
         for (voxel, _) in found.filter(|(_, value)| inside.holds(*value)) {
             let index = volume.index(voxel);
-            count += 1;
             for axis in 0..3 {
                 low[axis] = low[axis].min(index[axis]);
                 high[axis] = high[axis].max(index[axis]);
             }
         }
-        if count == 0 {
+        if low[0] == usize::MAX {
             let [low, high] = volume.range();
             return Err(Error::NothingInside {
                 what: inside.to_string(),
@@ -248,7 +300,6 @@ impl Part {
         Ok(Self {
             first: low.map(|i| i as isize - MARGIN as isize),
             size: [0, 1, 2].map(|axis| high[axis] - low[axis] + 1 + 2 * MARGIN),
-            count,
         })
     }
 

@@ -56,7 +56,7 @@ mod volume;
 mod warning;
 mod write;
 
-pub use body::{Body, Inside};
+pub use body::{Body, Inside, Speck};
 pub use error::{Error, FormatError};
 pub use read::{decode, decode_frame, holds_stack, is_stack, read, read_frame};
 pub use volume::{Values, Volume};
