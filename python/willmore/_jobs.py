@@ -122,6 +122,7 @@ def surfaces(
     affine: Any = None,
     spacing: Any = None,
     origin: Any = None,
+    detail: float | None = None,
     volume: Any = "keep",
     cells: int | None = None,
     progress: Progress = False,
@@ -142,8 +143,10 @@ def surfaces(
         From indices of voxels to positions, as in nibabel; by default that of the image.
     spacing, origin : float or three of them, optional
         Sides of a voxel and the centre of the first one, in place of `affine`; by default 1 and 0.
+    detail : float, optional
+        Details with a smaller radius are smoothed away. By default it is two voxels.
     volume : "keep", float, "90%" or None
-        The volume of the voxels stays, goes to a value or to a part of it, or is left alone (None).
+        The volume of the voxels stays, also that of each part, goes to a value or to a part of it, or is left alone (None).
     cells : int, optional
         Cells of the grid per unit length of the box. By default the grid is as fine as the voxels, if that is possible.
     progress : bool or callable
@@ -170,7 +173,7 @@ def surfaces(
     >>> bool(abs(ball.report["volume"] / (8 * 1472) - 1) < 0.02)
     True
     """
-    options = {"volume": volume, "cells": cells, **more}
+    options = {"detail": detail, "volume": volume, "cells": cells, **more}
     name = _meshes.of_path(labels)
     voxels = None if name is not None else _inputs.of_voxels(labels, affine=affine, spacing=spacing, origin=origin)
     if voxels is None and not (affine is None and spacing is None and origin is None):

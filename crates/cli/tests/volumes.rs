@@ -232,6 +232,63 @@ fn every_place_keeps_its_volume() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
 }
 
+/// A bump on a ball goes if its radius is half the length, and stays if it is twice the length.
+#[test]
+fn details_below_a_length_go() {
+    const BUMP: [f64; 2] = [2.5, 3.0];
+    let folder = tempfile::tempdir().unwrap();
+    let centre = [18.4, 18.4, 17.4];
+    write(&folder.path().join("bump.nii"), |x| {
+        let off = [0, 1, 2].map(|i| x[i] - centre[i]);
+        let across = off[0].hypot(off[1]) / BUMP[0];
+        let bump = if off[2] > 0.0 {
+            BUMP[1] * 0.5_f64.powf(across * across)
+        } else {
+            0.0
+        };
+        u8::from(ball(x, centre, 13.0 + bump))
+    });
+    let height = |radii: f64| {
+        let detail = format!("{}", radii * BUMP[0] * SIDE);
+        let options = [
+            "--cells",
+            "64",
+            "--no-page",
+            "--force",
+            "--output",
+            "run",
+            "--save",
+            "out.ply",
+        ];
+        let fair = ["fair", "bump.nii", "--detail", &detail];
+        outcome(folder.path(), &[&fair[..], &options].concat());
+        let mesh = closed(&folder.path().join("out.ply"));
+        let distances = mesh.mesh().vertices.iter().map(|x| {
+            let off = (0..3).map(|i| ((x[i] - ORIGIN[i]) / SIDE - centre[i]).powi(2));
+            off.sum::<f64>().sqrt()
+        });
+        distances.fold(0.0, f64::max) - 13.0
+    };
+    let heights = [2.0, 1.0, 0.5].map(height);
+    assert!(heights.is_sorted(), "{heights:?}");
+    assert!(
+        heights[0] < 0.25 * BUMP[1] && heights[2] > 0.6 * BUMP[1],
+        "{heights:?}"
+    );
+    for (arguments, part) in [
+        (
+            ["fair", "builtin:figure", "--detail", "0.1"],
+            "--detail has no meaning for an input that is no segmentation",
+        ),
+        (["fair", "bump.nii", "--detail", "-1"], "--detail"),
+    ] {
+        let output = program(folder.path()).args(arguments).output().unwrap();
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(part), "{error}");
+    }
+}
+
 /// Fairs a noisy sphere with its volume kept; the volume of its zero set over that of the mesh.
 fn fair_noisy_sphere(options: &[&str]) -> f64 {
     let folder = tempfile::tempdir().unwrap();

@@ -5,6 +5,7 @@ use crate::input::{Loaded, Source, closed};
 use crate::keep;
 use crate::options::{FairOptions, WillmoreOptions};
 use crate::own::OwnMesh;
+use crate::parts::DETAIL;
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::SizeTarget;
@@ -12,9 +13,10 @@ use crate::values::SizeTarget;
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
 
-/// A segmentation flows for so long that details of so many voxels vanish, which are the staircase of its voxels.
-const STEPS: f64 = 1.6;
-/// The surface of a segmentation goes no further than so many voxels, root of the mean square.
+/// The flow of a segmentation ends at the fourth power of so many times the radius below which details go. Of a bump with a Gaussian profile, whose
+/// height is halved at this radius, the flow leaves 0.37 of the height, of one with half the radius 0.12, and of one with twice the radius 0.79.
+const TIME_OF_DETAIL: f64 = 0.8;
+/// The surface goes no further than so many voxels, root of the mean square, unless the radius is given.
 const FARTHEST: f64 = 0.35;
 
 /// Where more than this part of the vertices is flat, edges may have been taken for noise.
@@ -24,10 +26,11 @@ impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
     pub(crate) fn takes_small_steps(&self) -> bool {
         let ratio = self.energy_ratio.or(self.willmore.energy);
-        self.noise.is_some() || ratio.is_some() || !self.says_when_to_end()
+        let details = self.noise.or(self.detail);
+        details.is_some() || ratio.is_some() || !self.says_when_to_end()
     }
 
-    /// Whether an option other than the noise says when it ends.
+    /// Whether an option other than the noise and the details says when it ends.
     pub(crate) fn says_when_to_end(&self) -> bool {
         self.energy_ratio.is_some()
             || self.willmore.energy.is_some()
@@ -49,6 +52,10 @@ impl FairOptions {
         let ends = self.says_when_to_end();
         let mut reader = self.input.reader(&self.operator, device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
+        if self.detail.is_some() && !matches!(reader.source, Source::Volume(_)) {
+            let what = "an input that is no segmentation";
+            return Err(Error::foreign("detail", "", what));
+        }
         let loaded = match reader.source.clone() {
             Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
@@ -65,10 +72,15 @@ impl FairOptions {
                 reader.keeps_volumes = willmore.volume == Some(SizeTarget::Keep);
                 let mut loaded = reader.load()?;
                 if let Loaded::Space(start) = &mut loaded
-                    && let Some(voxels) = start.presentation.voxels.as_mut().filter(|_| !ends)
+                    && let Some(voxels) = &mut start.presentation.voxels
                 {
-                    voxels.farthest = Some(FARTHEST * voxels.side);
-                    voxels.time = Some((STEPS * voxels.side).powi(4));
+                    let usual = DETAIL * voxels.side;
+                    let detail = self.detail.or((!ends).then_some(usual));
+                    voxels.time = detail.map(|detail| (TIME_OF_DETAIL * detail).powi(4));
+                    voxels.detail = detail.unwrap_or(usual);
+                    if !ends && self.detail.is_none() {
+                        voxels.farthest = Some(FARTHEST * voxels.side);
+                    }
                 }
                 loaded
             }

@@ -396,10 +396,17 @@ pub struct FairOptions {
     /// Standard deviation of the noise that is taken off, in the units of the mesh [default: estimated]
     ///
     /// Only the deviation along the normals counts. If `time`, `energy`, `energy_ratio` or `steps` says when to stop, the default is 0. For a
-    /// segmentation, `noise` is refused. Its flow stops at the time (1.6 voxels)^4, or earlier if its surface has moved by 0.35 of a voxel. If one of
-    /// these four options says when to stop, that option decides instead.
+    /// segmentation, `noise` is refused: see `detail`.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
+
+    /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: two voxels]
+    ///
+    /// The flow stops at the time (0.8 LENGTH)^4. A bump with the radius LENGTH / 2 vanishes, and a bump with the radius 2 LENGTH stays. With the
+    /// default, the flow also stops when the surface has moved by 0.35 of a voxel. If `time`, `energy`, `energy_ratio` or `steps` says when to
+    /// stop, there is no default.
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
+    pub detail: Option<f64>,
 
     /// Stop as soon as the Willmore energy is no more than PART of the energy at the beginning
     ///

@@ -11,8 +11,10 @@ use crate::presentation::Topology;
 const FILE: &str = "voxels.ply";
 /// Parts smaller than balls of this radius, in interface widths, stay as they are where parts keep their volumes: a phase field does not hold them.
 const SMALL: f64 = 1.5;
-/// Waves that are longer than some five times so many voxels are those of the voxels.
-const LONG: f64 = 2.5;
+/// The usual radius below which details go, in voxels.
+pub const DETAIL: f64 = 2.0;
+/// Waves that are longer than some five times so many of these radii are those of the voxels.
+const LONG: f64 = 1.25;
 
 /// Voxels as the surface that is between them.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -21,6 +23,8 @@ pub struct Voxels {
     pub volume: f64,
     /// The side of a cube as large as a voxel.
     pub side: f64,
+    /// The radius below which details go.
+    pub detail: f64,
     /// How far the surface may go, root of the mean square, and for how long, if that ends the flow.
     pub farthest: Option<f64>,
     #[serde(default)]
@@ -99,6 +103,7 @@ impl Voxels {
         Self {
             volume: surface.volume(),
             side,
+            detail: DETAIL * side,
             surface: Some(Box::new(surface)),
             ..Self::default()
         }
@@ -267,7 +272,7 @@ impl Matched {
         let filling = Filling::of(&rest, Cells::new(rest.vertices[0], sides));
         let made = self.made.mesh();
         let righted = filling.map(|filling| {
-            let filled = made.with_filling(&filling, LONG * side);
+            let filled = made.with_filling(&filling, LONG * voxels.detail);
             filled.with_volumes(&self.new, &volumes)
         });
         let righted = righted.filter(|mesh| closed(mesh.clone()).is_some());

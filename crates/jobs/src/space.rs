@@ -29,7 +29,7 @@ pub struct Space {
 impl Space {
     /// Whether what is taken off is noise, or the staircase of voxels, so that there is no growth to leave room for.
     fn hardly_moves(&self) -> bool {
-        let ends_early = |voxels: &Voxels| voxels.farthest.is_some();
+        let ends_early = |voxels: &Voxels| voxels.time.is_some();
         self.own.is_some() || self.voxels.as_ref().is_some_and(ends_early)
     }
 }
