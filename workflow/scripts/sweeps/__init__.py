@@ -1,0 +1,1 @@
+"""Tables of runs, runs of the program `willmore`, and what comes of them."""
