@@ -18,6 +18,8 @@ rule gather:
         steps_parquet="results/tables/{group}_steps.parquet",
     log:
         "results/logs/gather/{group}.log",
+    conda:
+        "../envs/scripts.yaml"
     script:
         "../scripts/gather.py"
 
@@ -30,6 +32,8 @@ rule energy:
         report("results/figures/{group}/energy.svg", caption="../report/energy.rst", category="{group}", labels={"what": "energy over time"}),
     log:
         "results/logs/energy/{group}.log",
+    conda:
+        "../envs/scripts.yaml"
     params:
         unit=config.get("unit", "length"),
     script:
@@ -43,6 +47,8 @@ rule figure:
         report("results/figures/{group}/{figure}.svg", caption="../report/figure.rst", category="{group}", labels={"what": "{figure}"}),
     log:
         "results/logs/figure/{group}/{figure}.log",
+    conda:
+        "../envs/scripts.yaml"
     params:
         figure=lambda wildcards: FIGURES[wildcards.figure],
         unit=config.get("unit", "length"),
@@ -57,5 +63,7 @@ rule shapes:
         report("results/figures/{group}/shapes.png", caption="../report/shapes.rst", category="{group}", labels={"what": "shapes at the end"}),
     log:
         "results/logs/shapes/{group}.log",
+    conda:
+        "../envs/scripts.yaml"
     script:
         "../scripts/shapes.py"

@@ -6,6 +6,8 @@ rule run:
         "results/outcomes/{group}/{run}.json",
     log:
         "results/logs/run/{group}/{run}.log",
+    conda:
+        "../envs/scripts.yaml"
     params:
         run=lambda wildcards: asdict(run_of(wildcards)),
         program=PROGRAM,

@@ -22,9 +22,6 @@ SHOWN = {
     "mesh.displacement_rms": "displacement, root mean square",
     "mesh.displacement_largest": "largest displacement",
     "seconds": "seconds",
-    "ended": "ended, since",
-    "warnings": "warnings",
-    "message": "refused, since",
 }
 
 
@@ -100,11 +97,17 @@ def page(runs: pandas.DataFrame) -> str:
     """The most important columns as a page for the browser."""
     columns = {name: name for name in ["run", "status", *varied(runs)] if name != "input" or "run" not in runs}
     columns |= {name: title for name, title in SHOWN.items() if name in runs and runs[name].notna().any()}
-    head = "".join(f"<th>{html.escape(title)}</th>" for title in columns.values())
-    body = "".join(f'<tr class="{row["status"]}">{"".join(_cell(row[name]) for name in columns)}</tr>\n' for row in runs.to_dict("records"))
+    head = "".join(f"<th>{html.escape(title)}</th>" for title in [*columns.values(), "what the program told"])
+    rows = [(row, [*(row[name] for name in columns), _told(row)]) for row in runs.to_dict("records")]
+    body = "".join(f'<tr class="{row["status"]}">{"".join(map(_cell, cells))}</tr>\n' for row, cells in rows)
     count = runs.drop_duplicates("run")["status"].value_counts()
     title = ", ".join(f"{number} {status}" for status, number in count.items())
     return PAGE.replace("TITLE", title).replace("HEAD", head).replace("BODY", body)
+
+
+def _told(row: dict[str, Any]) -> str:
+    """Why a run ended, its warnings, and why it was refused."""
+    return "; ".join(row[name] for name in ("ended", "warnings", "message") if isinstance(row[name], str))
 
 
 def _cell(value: Any) -> str:

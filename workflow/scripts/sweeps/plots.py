@@ -70,6 +70,7 @@ def energy(runs: pandas.DataFrame, steps: pandas.DataFrame, unit: str) -> Figure
     column, metric = ("willmore_energy", "energy") if has_energy else ("area", "area")
     if not len(steps):
         return _empty("No run has made a step.")
+    runs = _with_defaults(runs)
     panel = "input" if 1 < runs["input"].nunique() <= MOST_PANELS else None
     colour, style = _roles(runs, [name for name in varied(runs) if name != panel])
     paths = dict(list(steps.groupby("folder")))
@@ -82,15 +83,14 @@ def energy(runs: pandas.DataFrame, steps: pandas.DataFrame, unit: str) -> Figure
         axis.set_xlabel(_label("time", runs, unit))
         _scale(axis, "x", steps["time"])
         _scale(axis, "y", steps[column])
-        if axis.get_subplotspec().is_first_col():
-            axis.set_ylabel(_label(metric, runs, unit))
+    figure.supylabel(_label(metric, runs, unit), fontsize="medium")
     _legend(figure, runs, colour, style)
     return figure
 
 
 def metric(runs: pandas.DataFrame, wanted: dict[str, str], unit: str) -> Figure:
     """A result over a parameter."""
-    runs = runs[runs["folder"].notna()]
+    runs = _with_defaults(runs[runs["folder"].notna()])
     x, y, colour, panel = (_column(runs, wanted.get(key)) for key in ("x", "y", "colour", "panel"))
     if not len(runs):
         return _empty("No run is finished.")
@@ -108,8 +108,7 @@ def metric(runs: pandas.DataFrame, wanted: dict[str, str], unit: str) -> Figure:
         if _numbers(runs[x]) is not None:
             _scale(axis, "x", pandas.Series(places.values()), wanted.get("log", "auto"))
         _ticks(axis, runs[x], places)
-        if axis.get_subplotspec().is_first_col():
-            axis.set_ylabel(_label(y, runs, unit))
+    figure.supylabel(_label(y, runs, unit), fontsize="medium")
     _legend(figure, runs, colour, None, with_markers=True)
     return figure
 
@@ -121,7 +120,7 @@ def shapes(runs: pandas.DataFrame) -> Figure:
     side = 12 / columns
     figure, axes = plt.subplots(rows, columns, figsize=(12, rows * (side + 0.45)), squeeze=False, layout="constrained")
     for axis in axes.flat:
-        axis.set(xticks=[], yticks=[])
+        axis.set(xticks=[], yticks=[], box_aspect=1)
         axis.grid(False)
         axis.spines[:].set(visible=True, color="#dddddd")
     for axis in axes.flat[len(runs) :]:
@@ -129,13 +128,19 @@ def shapes(runs: pandas.DataFrame) -> Figure:
     for axis, row in zip(axes.flat, runs.to_dict("records")):
         label = "" if _is_missing(row["label"]) else f", label {row['label']}"
         axis.set_title("\n".join(textwrap.wrap(f"{row['run']}{label}".replace("_", " "), 28)), fontsize=6.5)
-        picture = Path(row["folder"] or "") / "final.png"
-        if picture.is_file():
+        picture = None if _is_missing(row["folder"]) else Path(row["folder"]) / "final.png"
+        if picture and picture.is_file():
             axis.imshow(matplotlib.image.imread(picture))
         else:
             text = "\n".join(textwrap.wrap(f"{row['status']}: {row['message']}", 34)[:9])
             axis.text(0.03, 0.96, text, transform=axis.transAxes, va="top", fontsize=5.5, color="#a03c00")
     return figure
+
+
+def _with_defaults(runs: pandas.DataFrame) -> pandas.DataFrame:
+    """The runs, with a word in place of options that are not given."""
+    options = [name for name in runs if name.startswith("--") and runs[name].isna().any()]
+    return runs.assign(**{name: runs[name].astype(object).where(runs[name].notna(), "default") for name in options})
 
 
 def _column(runs: pandas.DataFrame, name: str | None) -> str | None:
