@@ -8,5 +8,6 @@ outcomes = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(Path
 for outcome in outcomes:
     if outcome["status"] != "finished":
         print(f"{outcome['status']}: {outcome['run']}: {outcome['message']}")
-print(", ".join(f"{count} {status}" for status, count in Counter(outcome["status"] for outcome in outcomes).items()))
+counts = Counter(outcome["status"] for outcome in outcomes)
+print(", ".join(f"{counts[status]} {status}" for status in ("finished", "failed", "refused") if counts[status]))
 print("tables are in results/tables, figures in results/figures, the report is results/report.zip")

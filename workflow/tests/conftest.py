@@ -3,7 +3,6 @@
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -89,6 +88,3 @@ def outcomes(folder: Path) -> list[Path]:
 
 def folders_of_runs(folder: Path, group: str = "*") -> list[Path]:
     return sorted(path for path in folder.glob(f"results/runs/{group}/*") if path.is_dir())
-
-
-__all__ = ["folders_of_runs", "outcomes", "signal", "start", "start_and_kill"]

@@ -31,10 +31,22 @@ def lines(folder: Path, expected: int = 2) -> list[str]:
 @pytest.mark.parametrize(
     ("row", "line"),
     [
-        ("a\tflow\tbuiltin:cross\tthirty", 'row 2 (a), column cells: "thirty" is not a whole number of cells, such as 64; correct it, or leave the cell empty'),
-        ("a\tflow\tbuiltin:cross\t-3", 'row 2 (a), column cells: "-3" is not a whole number of cells, such as 64; correct it, or leave the cell empty'),
-        ("a\tflow\tbuiltin:cross\t32\t1.5 %", 'row 2 (a), column tolerance: "1.5 %" is not a length or a percentage, such as 1.5%; correct it, or leave the cell empty'),
-        ("a\tflow\tbuiltin:cross\t32\t\t0.1", "row 2 (a), column noise: the command flow has no such option; leave the cell empty, or take the command fair"),
+        (
+            "a\tflow\tbuiltin:cross\tthirty",
+            'row 2 (a), column cells: "thirty" is not a whole number of cells, such as 64; correct it, or leave the cell empty',
+        ),
+        (
+            "a\tflow\tbuiltin:cross\t-3",
+            'row 2 (a), column cells: "-3" is not a whole number of cells, such as 64; correct it, or leave the cell empty',
+        ),
+        (
+            "a\tflow\tbuiltin:cross\t32\t1.5 %",
+            'row 2 (a), column tolerance: "1.5 %" is not a length or a percentage, such as 1.5%; correct it, or leave the cell empty',
+        ),
+        (
+            "a\tflow\tbuiltin:cross\t32\t\t0.1",
+            "row 2 (a), column noise: the command flow has no such option; leave the cell empty, or take the command fair",
+        ),
         ("a\tflo\tbuiltin:cross", 'row 2 (a), column command: "flo" is not one of the commands flow, fair, inpaint and mcf; correct it'),
         ("a\tflow", "row 2 (a), column input: the cell is empty; give a file, a built-in shape or a region, such as builtin:cross"),
         ("a b\tflow\tbuiltin:cross", 'row 2 (a b), column run: "a b" is not a name of letters, digits and . _ = + -; correct it'),
@@ -113,11 +125,20 @@ def test_errors_of_the_configuration(sweep_folder: Path, text: str, line: str):
 def test_a_program_that_is_missing(sweep_folder: Path):
     (sweep_folder / "config/config.yaml").write_text("runs: config/runs.tsv\nprogram: wilmore\n")
     (sweep_folder / "config/runs.tsv").write_text(HEADER + "a\tflow\tbuiltin:cross\n")
-    assert lines(sweep_folder) == ["config/config.yaml, program: there is no program wilmore; install it by `cargo install --path crates/cli`, or give its path"]
+    assert lines(sweep_folder) == [
+        "config/config.yaml, program: there is no program wilmore; install it by `cargo install --path crates/cli`, or give its path"
+    ]
 
 
 def test_lists_become_all_combinations(sweep_folder: Path):
-    entry = {"run": "plane", "command": "flow", "input": ["builtin:cross", "builtin:ring"], "tolerance": ["1%", 1e-3], "time": "1e-4", "repair": False}
+    entry = {
+        "run": "plane",
+        "command": "flow",
+        "input": ["builtin:cross", "builtin:ring"],
+        "tolerance": ["1%", 1e-3],
+        "time": "1e-4",
+        "repair": False,
+    }
     (sweep_folder / "runs.yaml").write_text(yaml.safe_dump([entry, {"run": "one", "command": "mcf", "input": "builtin:disc"}]))
     runs = tables.load("runs.yaml", None)["sweep"]
     assert [run.name for run in runs] == ["plane_cross_1pct", "plane_cross_0.001", "plane_ring_1pct", "plane_ring_0.001", "one"]

@@ -100,7 +100,7 @@ class Record:
 
 
 def beside(folder: Path, suffix: str) -> Path:
-    """A file beside a folder. Names of runs may have dots."""
+    """A file beside another one, or beside a folder."""
     return folder.with_name(folder.name + suffix)
 
 
@@ -108,10 +108,11 @@ def folder_of(run: Run) -> Path:
     """The folder of a run. Its name depends on the options and on the content of the input, so that no run is resumed with other ones."""
     digest = hashlib.sha256()
     options = {name: value for name, value in run.options.items() if Path(str(value)) not in map(Path, run.files())}
-    digest.update(json.dumps([run.command, options], sort_keys=True).encode())
+    digest.update(json.dumps([run.name, run.command, options], sort_keys=True).encode())
     for value in [run.input, *sorted(set(run.files()) - {run.input})]:
         digest.update(_content(value) if value in run.files() else value.encode())
-    return RUNS / run.group / f"{run.name}-{digest.hexdigest()[:8]}"
+    # Without dots, before which the program would put the name of a label.
+    return RUNS / run.group / f"{run.name.replace('.', '_')}-{digest.hexdigest()[:8]}"
 
 
 def _content(path: str) -> bytes:
