@@ -46,16 +46,22 @@ def sweep(tmp_path_factory: pytest.TempPathFactory, program: str) -> Path:
     return folder
 
 
-def start(folder: Path, *arguments: str, code: int = 0) -> str:
-    """Starts a sweep on two cores and returns what it printed."""
-    done = subprocess.run([START, folder, "--cores", "2", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+HERE = ("default", "--cores", "2")
+CLUSTER = ("slurm",)
+
+
+def start(folder: Path, *arguments: str, on: tuple[str, ...] = HERE, code: int = 0) -> str:
+    """Starts a sweep with a profile and its arguments, and returns what it printed."""
+    call = [START, "--profile", on[0], folder, *on[1:], *arguments]
+    done = subprocess.run(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert done.returncode == code, done.stdout[-5000:]
     return done.stdout
 
 
-def start_and_kill(folder: Path, moment: Callable[[], bool]) -> None:
+def start_and_kill(folder: Path, moment: Callable[[], bool], on: tuple[str, ...] = HERE) -> None:
     """Starts a sweep, and kills all of its processes by SIGKILL when the moment has come."""
-    started = subprocess.Popen([START, folder, "--cores", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    call = [START, "--profile", on[0], folder, *on[1:]]
+    started = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     while not moment():
         assert started.poll() is None, "the sweep ended before it was killed"
         time.sleep(0.02)

@@ -29,6 +29,8 @@ MARKERS = ["o", "s", "^", "D", "v", "P", "X"]
 # More runs than that are drawn as thin lines of one colour.
 MOST_ENTRIES = 12
 MOST_PANELS = 9
+# Shorter runs have a point for each step.
+FEW_STEPS = 8
 
 NAMES = {
     "time": "time",
@@ -79,7 +81,10 @@ def energy(runs: pandas.DataFrame, steps: pandas.DataFrame, unit: str) -> Figure
         for row in part.to_dict("records"):
             if row["folder"] in paths:
                 path = paths[row["folder"]]
-                axis.plot(path["time"], path[column], linewidth=1.4, **_look(runs, row, colour, style))
+                times, values = list(path["time"]), list(path[column])
+                if has_energy:
+                    times, values = [0.0, *times], [row["first_energy"], *values]
+                axis.plot(times, values, linewidth=1.4, marker="." if len(times) < FEW_STEPS else None, **_look(runs, row, colour, style))
         axis.set_xlabel(_label("time", runs, unit))
         _scale(axis, "x", steps["time"])
         _scale(axis, "y", steps[column])
@@ -99,7 +104,8 @@ def metric(runs: pandas.DataFrame, wanted: dict[str, str], unit: str) -> Figure:
     figure, panels = _panels(runs, panel)
     places = _places(runs[x])
     for axis, part in panels:
-        for value, line in _lines(part, colour):
+        for line in _lines(part, x):
+            value = None if colour is None else line[colour].iloc[0]
             look = {"color": _colour(runs, colour, value), "marker": _marker(runs, colour, value)}
             points = sorted(zip((places[str(v)] for v in line[x]), pandas.to_numeric(line[y], errors="coerce")))
             axis.plot(*zip(*points), markersize=5, linewidth=1.2, **look)
@@ -148,9 +154,10 @@ def _column(runs: pandas.DataFrame, name: str | None) -> str | None:
     return next((column for column in (name, f"--{name}") if column in runs), None)
 
 
-def _lines(runs: pandas.DataFrame, colour: str | None) -> list[tuple[Any, pandas.DataFrame]]:
-    """Runs that a line joins."""
-    return [(None, runs)] if colour is None else list(runs.groupby(colour, sort=False))
+def _lines(runs: pandas.DataFrame, x: str) -> list[pandas.DataFrame]:
+    """Runs that a line joins: they differ in nothing but one parameter."""
+    others = [name for name in varied(runs) if name != x]
+    return [part for _, part in runs.groupby(others, sort=False)] if others else [runs]
 
 
 def _numbers(values: pandas.Series) -> pandas.Series | None:
@@ -253,7 +260,8 @@ def _scale(axis: Axes, which: str, values: pandas.Series, log: str = "auto") -> 
     if (values == values.round()).all():
         (axis.xaxis if which == "x" else axis.yaxis).set_major_locator(MaxNLocator(integer=True))
     if log in (which, "both") and values.min() > 0 or log == "auto" and wide:
-        (axis.set_xscale if which == "x" else axis.set_yscale)("log")
+        # The start at time 0 has no place on such an axis.
+        (axis.set_xscale if which == "x" else axis.set_yscale)("log", nonpositive="mask")
 
 
 def _label(name: str, runs: pandas.DataFrame, unit: str) -> str:
