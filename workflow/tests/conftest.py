@@ -17,9 +17,9 @@ WORKFLOW = Path(__file__).parents[1]
 START = WORKFLOW / "start"
 sys.path.insert(0, str(WORKFLOW / "scripts"))
 
-# Where cargo puts the program, unless PATH has one.
+# Where cargo puts the program. Where there is none, that of PATH is tested.
 BUILT = WORKFLOW.parent / "target" / "debug"
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"], str(BUILT)])
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), str(BUILT), os.environ["PATH"]])
 
 
 @pytest.fixture(scope="session")
