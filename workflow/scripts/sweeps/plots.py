@@ -82,7 +82,7 @@ def energy(runs: pandas.DataFrame, steps: pandas.DataFrame, unit: str) -> Figure
             if row["folder"] in paths:
                 path = paths[row["folder"]]
                 times, values = list(path["time"]), list(path[column])
-                if has_energy:
+                if has_energy and not _is_log("x", steps["time"]):
                     times, values = [0.0, *times], [row["first_energy"], *values]
                 axis.plot(times, values, linewidth=1.4, marker="." if len(times) < FEW_STEPS else None, **_look(runs, row, colour, style))
         axis.set_xlabel(_label("time", runs, unit))
@@ -254,14 +254,18 @@ def _legend(figure: Figure, runs: pandas.DataFrame, colour: str | None, style: s
 
 
 def _scale(axis: Axes, which: str, values: pandas.Series, log: str = "auto") -> None:
-    """A logarithmic axis where it was asked for, or where positive values differ by more than a factor of ten."""
+    """A logarithmic axis where that helps or was asked for, and whole numbers for whole values."""
     values = values.dropna()
-    wide = len(values) > 0 and values.min() > 0 and values.max() > 10 * values.min()
     if (values == values.round()).all():
         (axis.xaxis if which == "x" else axis.yaxis).set_major_locator(MaxNLocator(integer=True))
-    if log in (which, "both") and values.min() > 0 or log == "auto" and wide:
-        # The start at time 0 has no place on such an axis.
-        (axis.set_xscale if which == "x" else axis.set_yscale)("log", nonpositive="mask")
+    if _is_log(which, values, log):
+        (axis.set_xscale if which == "x" else axis.set_yscale)("log")
+
+
+def _is_log(which: str, values: pandas.Series, log: str = "auto") -> bool:
+    """Whether an axis is logarithmic: its values are positive, and differ by more than a factor of ten unless it was asked for."""
+    positive = len(values) > 0 and values.min() > 0
+    return bool(positive and (log in (which, "both") or log == "auto" and values.max() > 10 * values.min()))
 
 
 def _label(name: str, runs: pandas.DataFrame, unit: str) -> str:
