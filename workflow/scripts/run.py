@@ -1,12 +1,16 @@
 """Starts or resumes a run, and writes its outcome. A refusal by the program is an outcome, too, so that it stops no other run."""
 
 import json
+import signal
 import sys
 from pathlib import Path
 
 from sweeps.program import Program, Stopped, beside, outcome_of
 from sweeps.tables import Run
 
+# Ctrl-C and the time limit of a cluster reach the program as well, which finishes its step. This script waits for it.
+for number in (signal.SIGINT, signal.SIGTERM):
+    signal.signal(number, lambda *_: None)
 try:
     outcome = outcome_of(Run(**snakemake.params.run), Program(snakemake.params.program, snakemake.threads))
 except Stopped as stopped:

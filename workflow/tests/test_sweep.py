@@ -2,10 +2,13 @@
 
 import fcntl
 import json
+import os
 import random
 import re
 import shutil
+import signal
 import subprocess
+import time
 import zipfile
 from pathlib import Path
 
@@ -14,8 +17,9 @@ import pandas
 import pytest
 import scans
 import yaml
-from conftest import WORKFLOW, outcomes, start
+from conftest import WORKFLOW, folders_of_runs, outcomes, start
 from kills import assert_runs_are_those_without_kills, kill_at_random, tables
+from sweeps.program import newest_step
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -160,3 +164,21 @@ def test_three_kills(tmp_path: Path, program: str, chance: random.Random):
     assert kill_at_random(tmp_path, 3, chance) >= 3
     assert len(outcomes(tmp_path)) == 24
     assert_runs_are_those_without_kills(tmp_path, program, tables(tmp_path)["sweep"])
+
+
+@pytest.mark.slow
+def test_ctrl_c_stores_the_steps_that_are_being_made(tmp_path: Path):
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").write_text("runs: config/runs.yaml\n")
+    entry = {"run": "one", "command": "flow", "input": "builtin:torus", "cells": 64, "tau": 1e-8, "steps": 1000}
+    (tmp_path / "config/runs.yaml").write_text(yaml.safe_dump([entry]))
+    started = subprocess.Popen([WORKFLOW / "start", tmp_path], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    while not list(tmp_path.glob("results/runs/sweep/*/checkpoints/step-*[1-9].ckpt")):
+        assert started.poll() is None
+        time.sleep(0.05)
+    os.killpg(started.pid, signal.SIGINT)
+    assert started.wait(60) != 0
+    (told,) = tmp_path.glob("results/runs/sweep/*.jsonl")
+    outcome = json.loads(told.read_text())
+    (folder,) = folders_of_runs(tmp_path)
+    assert not outcome["finished"] and outcome["steps"] == newest_step(folder) > 0
