@@ -1,4 +1,5 @@
 # The configuration and the tables, checked, and what the rules ask of them.
+import re
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +19,6 @@ except tables.TableError as error:
 
 RUNS = {(run.group, run.name): run for runs in GROUPS.values() for run in runs}
 FIGURES = {plots.name_of(figure): figure for figure in config.get("figures", [])}
-# A program beside the workflow is found from every folder.
 PROGRAM = config.get("program", "willmore")
 
 
