@@ -37,9 +37,10 @@ def outcomes_of(wildcards):
 
 
 def targets(wildcards):
-    """Tables and figures of every group."""
+    """Outcomes, tables and figures of every group. Without the outcomes, tables that are there would hide those that `--retry` has taken away."""
     files = []
-    for group in GROUPS:
+    for group, runs in GROUPS.items():
+        files += [f"results/outcomes/{group}/{run.name}.json" for run in runs]
         files += [f"results/tables/{group}.{suffix}" for suffix in ("csv", "parquet", "html")]
         files += [f"results/tables/{group}_steps.{suffix}" for suffix in ("csv", "parquet")]
         files += [f"results/figures/{group}/{name}" for name in ("energy.svg", "shapes.png")]
