@@ -60,7 +60,7 @@ def test_an_error_names_row_and_column_and_what_to_do(sweep_folder: Path, row: s
 
 
 def test_all_errors_are_told_at_once_and_rows_are_those_of_the_file(sweep_folder: Path):
-    text = HEADER + "# a comment\n\na\tflow\tbuiltin:cross\tx\nb\tflow\tbuiltin:cross\t32\ny\tfair\tbuiltin:cube\tx\n"
+    text = HEADER + "# a comment\n\na\tflow\tbuiltin:cross\tx\nb\tflow\tbuiltin:cross\t32\ny\tfair\tscans/a.ply\t32\n"
     (sweep_folder / "config/runs.tsv").write_text(text)
     found = lines(sweep_folder)
     assert [line.split(",")[1] for line in found] == [" row 4 (a)", " row 6 (y)"]

@@ -106,7 +106,6 @@ def check_config(config: Cells, path: str) -> list[str]:
 
 def _checked_rows(table: str, kind: str, errors: list[str]) -> list[Row]:
     """The rows of a table that have no errors."""
-    found = len(errors)
     path, rules = Path(table), schema(kind)
     if not path.is_file():
         errors.append(f"{table}: there is no such table; write one, or correct its name in config.yaml")
@@ -125,7 +124,7 @@ def _checked_rows(table: str, kind: str, errors: list[str]) -> list[Row]:
         errors.extend(_row_errors(row, rules))
         if len(errors) == before:
             good.append(row)
-    return good if len(errors) == found else []
+    return good
 
 
 def _read_tsv(path: Path) -> Iterator[Row]:
