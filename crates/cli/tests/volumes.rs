@@ -158,7 +158,7 @@ fn every_part_keeps_its_own_volume() {
     ] {
         assert!(told.contains(part), "{part}: {told}");
     }
-    for (file, shift) in [("start.ply", 0.12), ("balls.ply", 0.12)] {
+    for file in ["start.ply", "balls.ply"] {
         let mesh = closed(&folder.path().join(file));
         let parts = mesh.parts();
         let volumes = parts.volumes(mesh.mesh());
@@ -172,6 +172,7 @@ fn every_part_keeps_its_own_volume() {
                 (volumes[found] / count - 1.0).abs() < 1e-5,
                 "{file}, {count}: {volumes:?}"
             );
+            let shift = if count > 500.0 { 0.05 } else { 0.2 };
             assert!(far(&places[found]) < shift, "{file}, {count}: {places:?}");
         }
     }

@@ -31,8 +31,10 @@ pub struct Voxels {
     pub time: Option<f64>,
     /// Whether parts and places keep their volumes.
     pub keeps_volumes: bool,
-    /// The parts that do not flow.
+    /// The parts that do not flow, in ascending order,
     small: Vec<usize>,
+    /// and what these are together.
+    of_small: Topology,
     #[serde(skip)]
     surface: Option<Box<ClosedMesh>>,
 }
@@ -120,8 +122,17 @@ impl Voxels {
             return Vec::new();
         }
         small.retain(is_small);
-        self.small = numbers;
-        self.volume = self.flowing().volume();
+        if !small.is_empty() {
+            self.small = numbers;
+            let flowing = self.flowing();
+            let [all, flow] = [self.surface(), &flowing].map(Topology::of);
+            self.of_small = Topology {
+                components: all.components - flow.components,
+                euler_characteristic: (all.euler_characteristic.zip(flow.euler_characteristic))
+                    .map(|(all, flow)| all - flow),
+            };
+            self.volume = flowing.volume();
+        }
         small
     }
 
@@ -136,7 +147,9 @@ impl Voxels {
         if self.small.is_empty() {
             return surface.clone();
         }
-        let flowing = (surface.parts()).only(surface.mesh(), |part| !self.small.contains(&part));
+        let flowing = (surface.parts()).only(surface.mesh(), |part| {
+            self.small.binary_search(&part).is_err()
+        });
         closed(flowing).expect("parts of a closed surface are closed")
     }
 
@@ -155,16 +168,10 @@ impl Voxels {
 
     /// Parts and holes of the zero level set together with those of the parts that do not flow.
     pub fn with_small_parts(&self, flowing: Topology) -> Topology {
-        if self.small.is_empty() {
-            return flowing;
-        }
-        let (all, flow) = (Topology::of(self.surface()), Topology::of(&self.flowing()));
-        let numbers = (flowing.euler_characteristic)
-            .zip(all.euler_characteristic)
-            .zip(flow.euler_characteristic);
+        let small = self.of_small.euler_characteristic.unwrap_or_default();
         Topology {
-            components: flowing.components + all.components - flow.components,
-            euler_characteristic: numbers.map(|((now, all), flow)| now + all - flow),
+            components: flowing.components + self.of_small.components,
+            euler_characteristic: flowing.euler_characteristic.map(|number| number + small),
         }
     }
 
@@ -293,7 +300,7 @@ impl Matched {
         let after = self.new.volumes(mesh);
         let mut flowing = 0..;
         for (number, report) in reports.iter_mut().enumerate() {
-            if voxels.small.contains(&number) {
+            if voxels.small.binary_search(&number).is_ok() {
                 report.fate = PartFate::TooSmall;
                 report.volume_after = Some(report.volume_before);
                 continue;

@@ -14,7 +14,9 @@ const ROUNDS: usize = 3;
 const LONGEST: f64 = 0.25;
 /// The side of the bins of the average, in its widths,
 const BIN: f64 = 0.5;
-/// and the widths after which it ends.
+/// where the first of them begins before the first cell, in widths,
+const OFFSET: f64 = 0.1237;
+/// and the widths after which the average ends.
 const REACH: f64 = 3.0;
 /// Triangles that reach over more cells than this along an axis are not cut: positions are lost in rounding, or cells far smaller than triangles.
 const MOST_CELLS: f64 = 256.0;
@@ -211,8 +213,9 @@ impl TriangleMesh {
     }
 }
 
-/// Missing volumes, and areas of a surface, added up in cubes.
+/// Missing volumes, and areas of a surface, added up in cubes, and taken to be in their middle there.
 struct Bins {
+    origin: Vector,
     width: f64,
     number: HashMap<[i64; 3], usize>,
     all: Vec<Bin>,
@@ -222,64 +225,89 @@ struct Bins {
 
 #[derive(Clone, Copy, Default)]
 struct Bin {
-    centre: Vector,
-    missing: f64,
-    area: f64,
+    missing: Heap,
+    area: Heap,
+}
+
+/// Weights at places.
+#[derive(Clone, Copy, Default)]
+struct Heap {
+    sum: f64,
+    /// The sum of the absolute values,
+    size: f64,
+    /// and of these times the places.
+    moment: Vector,
+}
+
+impl Heap {
+    fn add(&mut self, weight: f64, x: Vector) {
+        self.sum += weight;
+        self.size += weight.abs();
+        self.moment += weight.abs() * x;
+    }
+
+    /// All that is there, times the value of a Gaussian about `x` in the middle.
+    fn seen_from(&self, x: Vector, width: f64) -> f64 {
+        if self.size > 0.0 {
+            let far = x.distance(self.moment / self.size) / width;
+            self.sum * (-0.5 * far * far).exp()
+        } else {
+            0.0
+        }
+    }
 }
 
 impl Bins {
     fn of(mesh: &TriangleMesh, cells: Cells, missing: &[([i64; 3], f64)], width: f64) -> Self {
+        // They go with the cells, and no plane of cells lies on a side of them, where rounding would decide.
+        let origin = cells.0.translation - OFFSET * width;
+        let volume = cells.0.matrix3.determinant().abs();
+        let missing = missing.iter().map(|(cell, part)| {
+            let x = cells.0.transform_point3(cell.map(|i| i as f64).into());
+            (x, part * volume)
+        });
         // In the order of their places, so that sums do not depend on chance.
         let mut bins: BTreeMap<[i64; 3], Bin> = BTreeMap::new();
-        let mut bin =
-            |x: Vector, add: &dyn Fn(&mut Bin)| add(bins.entry(key(x, width)).or_default());
-        let volume = cells.0.matrix3.determinant().abs();
-        for (cell, part) in missing {
-            let x = (cells.0).transform_point3(cell.map(|i| i as f64).into());
-            bin(x, &|bin| bin.missing += part * volume);
+        for (x, volume) in missing {
+            let bin = bins.entry(key(x - origin, width)).or_default();
+            bin.missing.add(volume, x);
         }
         for &face in &mesh.faces {
             let corners = mesh.corners(face);
             let third = scaled_normal(corners).length() / 6.0;
             for x in corners {
-                bin(x, &|bin| bin.area += third);
+                let bin = bins.entry(key(x - origin, width)).or_default();
+                bin.area.add(third, x);
             }
         }
-        let centre = |key: [i64; 3]| BIN * width * (Vector::from(key.map(|i| i as f64)) + 0.5);
         let keys: Vec<[i64; 3]> = bins.keys().copied().collect();
         let number = keys.iter().copied().zip(0..).collect();
         let near = keys.par_iter().map(|&key| near(key, &number));
         Self {
+            origin,
             width,
             near: near.collect(),
-            all: (bins.into_iter())
-                .map(|(key, bin)| Bin {
-                    centre: centre(key),
-                    ..bin
-                })
-                .collect(),
+            all: bins.into_values().collect(),
             number,
         }
     }
 
     /// The missing volume over the area about a vertex.
     fn average(&self, x: Vector) -> f64 {
-        let Some(&own) = self.number.get(&key(x, self.width)) else {
+        let Some(&own) = self.number.get(&key(x - self.origin, self.width)) else {
             return 0.0;
         };
         let (mut missing, mut area) = (0.0, 0.0);
         for &near in &self.near[own] {
             let bin = &self.all[near];
-            let far = x.distance_squared(bin.centre) / (self.width * self.width);
-            let weight = (-0.5 * far).exp();
-            missing += weight * bin.missing;
-            area += weight * bin.area;
+            missing += bin.missing.seen_from(x, self.width);
+            area += bin.area.seen_from(x, self.width);
         }
         if area > 0.0 { missing / area } else { 0.0 }
     }
 }
 
-/// The bin of a place.
+/// The bin of a place, from where the bins begin.
 fn key(x: Vector, width: f64) -> [i64; 3] {
     (x / (BIN * width)).floor().to_array().map(|i| i as i64)
 }
