@@ -8,6 +8,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -55,6 +56,15 @@ def test_the_table_of_runs(finished: Path):
         assert (row["energy"], row["grid.spacing"], row["steps"]) == (summary["energy"], summary["grid"]["spacing"], summary["steps"])
     steps = pandas.read_parquet(finished / "results/tables/sweep_steps.parquet")
     assert len(steps) == table["steps"].sum() and steps["willmore_energy"].gt(0).all()
+
+
+def test_the_code_of_the_document_runs(finished: Path, tmp_path: Path):
+    document = Path(__file__).resolve().parents[2] / "docs/sweeps.md"
+    blocks = re.findall(r"^```python\n(.*?)^```$", document.read_text(), re.MULTILINE | re.DOTALL)
+    (tmp_path / "my-sweep").symlink_to(finished)
+    code = "\n".join(blocks)
+    assert "read_parquet" in code
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
 
 
 def test_a_folder_of_thirty_files(finished: Path):
