@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,6 +30,9 @@ class Run:
     """
 
     def __init__(self, folder: str | os.PathLike[str]):
+        # Here and not at the beginning, as csv below: the package is imported for less than a run in a folder.
+        from pathlib import Path
+
         self.folder = Path(folder)
 
     @classmethod
@@ -147,6 +148,8 @@ class Run:
 
     @property
     def metrics(self) -> dict[str, np.ndarray]:
+        import csv
+
         with open(self.folder / "metrics.csv", newline="", encoding="utf-8") as file:
             rows = [{name: _number(text) for name, text in row.items()} for row in csv.DictReader(file)]
         return columns([renamed(row) for row in rows])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 import weakref
 from functools import cached_property
 from typing import Any
@@ -104,6 +102,10 @@ class Network:
     @cached_property
     def _path(self) -> str:
         """A file that is there as long as this object."""
+        # Not at the beginning: with what they import they take a megabyte, and few need them.
+        import shutil
+        import tempfile
+
         folder = tempfile.mkdtemp(prefix="willmore-")
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         path = os.path.join(folder, "network.safetensors")
