@@ -416,15 +416,15 @@ impl<'a> Reader<'a> {
         vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
-        let (field, surface) = self.first_good(grids, |reader| {
+        let (field, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
             let field = reader.mesh_field(mesh, grid)?;
-            let surface = surfaces::phase_field_surface(&field, reader.eps(&grid))?;
-            let surface = ClosedMesh::new(surface).ok().map(|(surface, _)| surface);
-            let found = surface.as_ref().map(Topology::of);
-            Ok(((field, surface), found == Some(wanted)))
+            let found = surfaces::phase_field_topology(&field)?.into();
+            Ok(((field, found), found == wanted))
         })?;
-        if let Some(loss) = self.loss(mesh, &field, surface.as_ref()) {
+        let surface = self.marched(&field)?;
+        if found != wanted {
+            let loss = self.loss(mesh, &field, surface.as_ref(), found);
             if refuses {
                 return Err(Error::Lost {
                     loss: Box::new(loss),
@@ -437,22 +437,28 @@ impl<'a> Reader<'a> {
         Ok((field, surface))
     }
 
-    /// The parts and holes of a mesh that its surface on the grid does not have.
+    /// The surface of a phase field, unless it touches itself.
+    fn marched(&self, field: &Stored<3>) -> Result<Option<ClosedMesh>> {
+        let surface = surfaces::phase_field_surface(field, self.eps(field.grid()))?;
+        Ok(ClosedMesh::new(surface).ok().map(|(surface, _)| surface))
+    }
+
+    /// What a mesh loses on a grid where its surface has another topology.
     fn loss(
         &self,
         mesh: &ClosedMesh,
         field: &Stored<3>,
         surface: Option<&ClosedMesh>,
-    ) -> Option<Loss> {
-        let (wanted, found) = (Topology::of(mesh), surface.map(Topology::of));
-        (found != Some(wanted)).then(|| Loss {
+        on_grid: Topology,
+    ) -> Loss {
+        Loss {
             cells: self.cells(),
             thinnest: thinnest(field.grid()),
             longest_side: mesh.bounding_box().longest_side(),
-            of_mesh: wanted,
-            on_grid: found.unwrap_or_default(),
+            of_mesh: Topology::of(mesh),
+            on_grid,
             distance: far_from(mesh, surface, field),
-        })
+        }
     }
 
     fn cells(&self) -> usize {
@@ -672,9 +678,10 @@ impl<'a> Reader<'a> {
         }
         let flowing = voxels.flowing();
         let field = self.mesh_field(&flowing, grid)?;
-        let marched = surfaces::phase_field_surface(&field, self.eps(&grid))?;
-        let marched = ClosedMesh::new(marched).ok().map(|(marched, _)| marched);
-        if let Some(loss) = self.loss(&flowing, &field, marched.as_ref()) {
+        let found = surfaces::phase_field_topology(&field)?.into();
+        if found != Topology::of(&flowing) {
+            let marched = self.marched(&field)?;
+            let loss = self.loss(&flowing, &field, marched.as_ref(), found);
             self.watcher.warning(&Warning::Lost(loss));
         }
         let space = Space {

@@ -402,9 +402,9 @@ pub struct FairOptions {
 
     /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: two voxels]
     ///
-    /// The flow stops at the time (0.8 LENGTH)^4. A bump with the radius LENGTH / 2 vanishes, and a bump with the radius 2 LENGTH stays. With the
-    /// default, the flow also stops when the surface has moved by 0.35 of a voxel. If `time`, `energy`, `energy_ratio` or `steps` says when to
-    /// stop, there is no default.
+    /// The flow stops at the time (0.8 LENGTH)^4. A bump with the radius LENGTH / 2 keeps 12 % of its height, one with the radius LENGTH 37 %, and
+    /// one with the radius 2 LENGTH 79 %. With the default, the flow also stops when the surface has moved by 0.35 of a voxel. If `time`, `energy`,
+    /// `energy_ratio` or `steps` says when to stop, there is no default.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub detail: Option<f64>,
 

@@ -25,15 +25,16 @@ pub struct Voxels {
     pub side: f64,
     /// The radius below which details go.
     pub detail: f64,
-    /// How far the surface may go, root of the mean square, and for how long, if that ends the flow.
+    /// The displacement, root of the mean square, that ends the flow.
     pub farthest: Option<f64>,
+    /// The time that ends the flow.
     #[serde(default)]
     pub time: Option<f64>,
     /// Whether parts and places keep their volumes.
     pub keeps_volumes: bool,
-    /// The parts that do not flow, in ascending order,
+    /// The parts that do not flow, in ascending order.
     small: Vec<usize>,
-    /// and what these are together.
+    /// The topology of all parts that do not flow.
     of_small: Topology,
     #[serde(skip)]
     surface: Option<Box<ClosedMesh>>,

@@ -196,7 +196,7 @@ fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
 }
 
 /// Leaves out vertices without faces and returns how many there were.
-fn drop_unreferenced(mesh: &mut TriangleMesh) -> usize {
+pub(crate) fn drop_unreferenced(mesh: &mut TriangleMesh) -> usize {
     let mut used = vec![false; mesh.vertices.len()];
     for &v in mesh.faces.as_flattened() {
         used[v as usize] = true;

@@ -119,8 +119,8 @@ impl MeshDistance {
         }
     }
 
-    /// The same, for somebody who needs distances within `near` only, if these take less than half of the grid: only they are stored, with the
-    /// rest of their bricks. Elsewhere the distance is `reach`, on either side.
+    /// As [`Self::sample_within`], for callers that need only distances below `near`. If the bricks with such distances are less than half of the
+    /// grid, only they are searched and stored. All other nodes have the distance `reach` outside and `-reach` inside. Both are lengths of the grid.
     ///
     /// # Errors
     /// As [`Self::sample`].

@@ -8,17 +8,17 @@ use rayon::prelude::*;
 use crate::TriangleMesh;
 use crate::vector::{Vector, scaled_normal};
 
-/// Rounds in which a surface takes on the volume near every place,
+/// Rounds in which a surface takes on the volume near every place.
 const ROUNDS: usize = 3;
-/// in each of which vertices go by at most this part of the width of the average.
+/// A vertex moves by at most this part of the width of the average in a round.
 const LONGEST: f64 = 0.25;
-/// The side of the bins of the average, in its widths,
+/// The side of the bins of the average, in its widths.
 const BIN: f64 = 0.5;
-/// where the first of them begins before the first cell, in widths,
+/// How far before the first cell the first bin begins, in widths.
 const OFFSET: f64 = 0.1237;
-/// and the widths after which the average ends.
+/// The average ends at this distance, in widths.
 const REACH: f64 = 3.0;
-/// Triangles that reach over more cells than this along an axis are not cut: positions are lost in rounding, or cells far smaller than triangles.
+/// Triangles over more cells than this along an axis are not cut: the cells would be far smaller than the triangles.
 const MOST_CELLS: f64 = 256.0;
 /// Cells are counted up to this number.
 const FARTHEST: f64 = 1e9;
@@ -233,9 +233,9 @@ struct Bin {
 #[derive(Clone, Copy, Default)]
 struct Heap {
     sum: f64,
-    /// The sum of the absolute values,
+    /// The sum of the absolute values of the weights.
     size: f64,
-    /// and of these times the places.
+    /// The sum of the absolute values of the weights times the places.
     moment: Vector,
 }
 

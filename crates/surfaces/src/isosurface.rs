@@ -44,7 +44,10 @@ pub fn isosurface(s: &impl PhaseField<3>) -> Result<TriangleMesh, Error> {
     marched(&Geometry {
         lattice: Lattice {
             size: grid.shape(),
-            values: &Scaled(s, 1.0),
+            values: &Scaled {
+                field: s,
+                factor: 1.0,
+            },
         },
         origin: grid.origin(),
         spacing: [grid.side(), grid.cells() as f64],

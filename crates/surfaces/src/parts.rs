@@ -1,5 +1,6 @@
 //! The parts of a closed surface, and their volumes.
 
+use crate::closed::drop_unreferenced;
 use crate::half_edges::HalfEdges;
 use crate::vector::Vector;
 use crate::{ClosedMesh, TriangleMesh};
@@ -85,17 +86,12 @@ impl Parts {
     pub fn only(&self, mesh: &TriangleMesh, is_meant: impl Fn(usize) -> bool) -> TriangleMesh {
         let faces = mesh.faces.iter().zip(&self.of_face);
         let faces = faces.filter(|(_, part)| is_meant(**part as usize));
-        let faces: Vec<[u32; 3]> = faces.map(|(face, _)| *face).collect();
-        let mut used = vec![false; mesh.vertices.len()];
-        for &vertex in faces.as_flattened() {
-            used[vertex as usize] = true;
-        }
-        let kept: Vec<usize> = (0..used.len()).filter(|&vertex| used[vertex]).collect();
-        let some = TriangleMesh {
-            faces,
+        let mut some = TriangleMesh {
+            faces: faces.map(|(face, _)| *face).collect(),
             ..mesh.clone()
         };
-        some.keeping(&kept)
+        drop_unreferenced(&mut some);
+        some
     }
 }
 

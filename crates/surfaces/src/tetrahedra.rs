@@ -26,18 +26,21 @@ pub trait Values: Sync {
 }
 
 /// A field times a number.
-pub struct Scaled<'a, F>(pub &'a F, pub f64);
+pub struct Scaled<'a, F> {
+    pub field: &'a F,
+    pub factor: f64,
+}
 
 impl<F: PhaseField<3>> Values for Scaled<'_, F> {
     fn at(&self, place: [usize; 3]) -> f64 {
-        self.1 * self.0.at(place)
+        self.factor * self.field.at(place)
     }
 
     fn read_row(&self, [i, j]: [usize; 2], row: &mut [f64]) {
-        let rows = self.0.nodes().grid().cells();
-        self.0.read((i * rows + j) * row.len(), row);
+        let rows = self.field.nodes().grid().cells();
+        self.field.read((i * rows + j) * row.len(), row);
         for value in row {
-            *value *= self.1;
+            *value *= self.factor;
         }
     }
 }
@@ -220,9 +223,9 @@ impl<S: LevelSet> March<'_, S> {
 /// enough.
 struct EdgeNumbers {
     columns: usize,
-    /// One more than the number of each edge of the even and of the odd layer,
+    /// One more than the number of each edge, in the even and in the odd layer.
     layers: [Vec<u32>; 2],
-    /// unless it is not more than this, for it was of an earlier layer.
+    /// Entries up to this one are left from earlier layers.
     stale: [usize; 2],
     layer: usize,
     count: usize,

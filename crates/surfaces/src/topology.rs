@@ -22,7 +22,10 @@ pub fn phase_field_topology(u: &impl PhaseField<3>) -> Result<Topology, Error> {
     u.check_finite()?;
     let lattice = Lattice {
         size: u.nodes().grid().shape(),
-        values: &Scaled(u, -1.0),
+        values: &Scaled {
+            field: u,
+            factor: -1.0,
+        },
     };
     let mut count = Count::default();
     march(&lattice, &mut count)?;
