@@ -49,6 +49,7 @@
 //! - The same input gives the same bytes: parallel sums have a fixed order.
 
 mod bricks;
+mod bspline;
 mod error;
 mod field;
 mod grid;
@@ -56,6 +57,7 @@ mod node_set;
 mod nodes;
 mod placement;
 mod profile;
+mod redistancing;
 mod spline;
 mod stored;
 mod thickness;
@@ -75,6 +77,7 @@ pub mod vti;
 pub mod zero_set;
 
 pub use bricks::Bricks;
+pub use bspline::{BSpline, Jet};
 pub use clifford::CliffordTorus;
 pub use distance::{SignedDistance, SignedDistanceExt};
 pub use error::{Error, positive, require};
@@ -87,6 +90,7 @@ pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,
     phase_field, profile_variable, stored_phase_field,
 };
+pub use redistancing::{DistanceRange, LevelPoint, Redistanced};
 pub use stored::Stored;
 pub use thickness::{is_thin, thickness, thin_part};
 pub use up::UpAxis;

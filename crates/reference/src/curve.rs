@@ -26,6 +26,24 @@ pub struct Curve {
     pub(crate) time: f64,
 }
 
+/// A circle, or a line, by one of its points.
+struct Circle {
+    point: [f64; 2],
+    /// The unit normal to the outside.
+    normal: [f64; 2],
+    curvature: f64,
+}
+
+impl Circle {
+    fn signed_distance(&self, x: [f64; 2]) -> f64 {
+        let [a, b] = [0, 1].map(|axis| x[axis] - self.point[axis]);
+        let along = a * self.normal[0] + b * self.normal[1];
+        // The squared distance from the centre in radii is 1 + curvature * gap.
+        let gap = 2.0 * along + self.curvature * (a * a + b * b);
+        gap / (1.0 + (1.0 + self.curvature * gap).max(0.0).sqrt())
+    }
+}
+
 impl Curve {
     /// Time since the start.
     pub fn time(&self) -> f64 {
@@ -125,6 +143,41 @@ impl Curve {
             best * self.scale
         };
         points.iter().map(distance).fold(0.0, f64::max)
+    }
+
+    /// The signed distance to the curve, negative inside, as a function of points: the distance to the osculating circle at the nearest of at
+    /// least 4096 points of the curve.
+    pub fn signed_distance(&self) -> impl Fn([f64; 2]) -> f64 + Send + Sync + use<> {
+        const FEWEST: usize = 4096;
+        let points = self.grid.points.max(FEWEST.div_ceil(self.grid.folds));
+        let circles = self
+            .with_points(points.next_multiple_of(2))
+            .osculating_circles();
+        move |x| {
+            let squared = |circle: &Circle| {
+                let [a, b] = [0, 1].map(|axis| x[axis] - circle.point[axis]);
+                a * a + b * b
+            };
+            let nearer = |a: &&Circle, b: &&Circle| squared(a).total_cmp(&squared(b));
+            let nearest = circles.iter().min_by(nearer).expect("a curve has points");
+            nearest.signed_distance(x)
+        }
+    }
+
+    /// The osculating circles at the nodes of the whole curve.
+    fn osculating_circles(&self) -> Vec<Circle> {
+        let tangents = Nodes::new(&self.grid, &self.angle, None).tangent;
+        let curvatures: Vec<f64> = self.curvatures_of_period().collect();
+        let circle = |(i, point): (usize, [f64; 2])| {
+            let (fold, i) = (i / self.grid.points, i % self.grid.points);
+            let tangent = tangents[i] * Complex::cis(TAU * fold as f64 / self.grid.folds as f64);
+            Circle {
+                point,
+                normal: [tangent.im, -tangent.re],
+                curvature: curvatures[i],
+            }
+        };
+        self.points().into_iter().enumerate().map(circle).collect()
     }
 
     /// `theta(alpha)`, the angle of the tangent against the x axis.
