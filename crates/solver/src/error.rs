@@ -70,6 +70,10 @@ pub enum Error {
     NoInterface,
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
+    #[error(
+        "direct steps are of the bending energy alone on the whole grid, without {what}; choose another stepper"
+    )]
+    NotDirect { what: &'static str },
     /// What a step of mean curvature flow refuses: a grid, scales, bricks.
     #[error("{0}")]
     Operator(StepFailure),

@@ -99,7 +99,7 @@ pub use newton::{Exit, NewtonInfo, minimize};
 pub use operators::{extrapolate, retract};
 pub use params::{FlowParams, NewtonParams, NewtonVariant, Precision};
 pub use problem::Problem;
-pub use record::{Start, StartKind, StepRecord};
+pub use record::{DirectRecord, Start, StartKind, StepRecord};
 pub use scheme::{Candidate, Scheme, StepSize};
 pub use second_order::{SecondOrder, StepEstimates};
 pub use state::{DeviceField, Memory, State};

@@ -31,6 +31,20 @@ pub struct Start {
     pub hvp: f64,
 }
 
+/// What a step did that minimizes nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DirectRecord {
+    /// The parts into which it was divided.
+    pub parts: usize,
+    /// Convolutions of the whole grid.
+    pub convolutions: usize,
+    /// The reach of the interface at its end: the largest radius of balls that touch it wherever they lie on it.
+    pub reach: f64,
+    /// How far the run of whole parts is from the run of half parts: about the time error of the latter, and more than that of the result, which is
+    /// extrapolated from both.
+    pub apart: f64,
+}
+
 /// One time step of Willmore flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepRecord {
@@ -63,6 +77,9 @@ pub struct StepRecord {
     /// How long the step was against what limits it, if it was of second order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub estimates: Option<StepEstimates>,
+    /// What was done in place of a minimization, if the step was direct.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direct: Option<DirectRecord>,
     /// Wall time in seconds, which is not stored: records of the same step are the same bytes.
     #[serde(skip)]
     pub seconds: f64,
@@ -124,6 +141,7 @@ impl<const D: usize> Minimum<D> {
             tension: self.tension,
             pressure: self.pressure,
             estimates: None,
+            direct: None,
             seconds: clock.elapsed().as_secs_f64(),
             times: self.times,
         }

@@ -1,0 +1,128 @@
+//! The kernel of a direct step.
+
+use std::array::from_fn;
+use std::f64::consts::PI;
+
+use crate::profile::Profile;
+
+/// Times of the heat kernels over [the scale](SCALE) `sqrt tau`: near each other, so that the kernel is narrow.
+const TIMES: [f64; 4] = [0.75, 0.9, 1.08, 1.3];
+/// With it the multipliers of waves are in (-0.89, 1]; with more than 0.89 steps are unstable.
+const STRENGTH: f64 = 0.83;
+
+/// A heat kernel `exp(-r^2 / 4t)` in the sum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    time: f64,
+    /// Its weight `b` in the multiplier of waves.
+    weight: f64,
+    /// `sqrt(4 pi t) / P`, which makes up for the profile: `P` is its mean under the kernel.
+    height: f64,
+    /// Second moment of the profile under the kernel, over its mean.
+    variance: f64,
+}
+
+/// The kernel `K` of a step of size `tau`, by its spectrum `sum_i b_i sqrt(4 pi t_i) / P(t_i) exp(-t_i |k|^2)`, which is the same in the plane and in
+/// space.
+///
+/// With `sum b = 1`, `sum b t = 0`, `sum b t^2 = -2 tau` and `sum b t^3 = 0`, the zero level of `K * q(s)` is that of `s`, displaced by `tau` times the
+/// velocity of Willmore flow, up to terms of second order in `tau`. See `docs/direct.md`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kernel {
+    tau: f64,
+    parts: [Part; 4],
+}
+
+impl Kernel {
+    /// The kernel for a grid of spacing `h`, at which the profile has its width.
+    pub fn new(spacing: f64, tau: f64) -> Self {
+        let (profile, scale) = (Profile { width: spacing }, (tau / STRENGTH).sqrt());
+        let part = |i: usize| {
+            let time = TIMES[i] * scale;
+            let [mean, second] = profile.moments(time);
+            Part {
+                time,
+                weight: weight(i),
+                height: (4.0 * PI * time).sqrt() / mean,
+                variance: second / mean,
+            }
+        };
+        Self {
+            tau,
+            parts: from_fn(part),
+        }
+    }
+
+    /// The spectrum at the squared wave number `|k|^2`.
+    pub fn symbol(&self, square: f64) -> f64 {
+        let part = |part: &Part| part.weight * part.height * (-part.time * square).exp();
+        self.parts.iter().map(part).sum()
+    }
+
+    /// The factor of a small wave of wave number `k` on a flat interface in one step; that of Willmore flow is `exp(-tau k^4)`.
+    pub fn multiplier(&self, k: f64) -> f64 {
+        let part = |part: &Part| part.weight * (-part.time * k * k).exp();
+        self.parts.iter().map(part).sum()
+    }
+
+    /// By which part the nonlinear terms of the velocity, `kappa^3 / 2` in the plane and `h (k1 - k2)^2 / 2` in space, come out too large:
+    /// `-sum b t v / 4 tau` with the second moments `v` of the profile.
+    pub fn excess(&self) -> f64 {
+        let part = |part: &Part| part.weight * part.time * part.variance;
+        -self.parts.iter().map(part).sum::<f64>() / (4.0 * self.tau)
+    }
+
+    /// The largest time of its heat kernels.
+    pub fn largest_time(&self) -> f64 {
+        self.parts[3].time
+    }
+}
+
+/// `b_i`: the value of the functional `1, t, t^2, t^3 -> 1, 0, -2 STRENGTH, 0` at the polynomial that is one at the time of number `i` and zero at the others.
+fn weight(i: usize) -> f64 {
+    let (mut product, mut sum, mut gaps) = (1.0, 0.0, 1.0);
+    for other in (0..4).filter(|j| *j != i).map(|j| TIMES[j]) {
+        product *= other;
+        sum += other;
+        gaps *= TIMES[i] - other;
+    }
+    (2.0 * STRENGTH * sum - product) / gaps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_weights_have_their_moments() {
+        let kernel = Kernel::new(0.01, 2e-5);
+        for (power, expected) in [1.0, 0.0, -4e-5, 0.0].into_iter().enumerate() {
+            let part = |part: &Part| part.weight * part.time.powi(power as i32);
+            let moment: f64 = kernel.parts.iter().map(part).sum();
+            let scale = 2e-5_f64.powf(0.5 * power as f64);
+            assert!(
+                (moment - expected).abs() < 1e-10 * scale,
+                "{power}: {moment}"
+            );
+        }
+    }
+
+    #[test]
+    fn waves_are_damped_as_the_flow_damps_them() {
+        let tau: f64 = 3e-6;
+        let kernel = Kernel::new(0.01, tau);
+        let mut least = 1.0_f64;
+        for step in 0..4000 {
+            let k = f64::from(step) * 0.002 * tau.powf(-0.25);
+            let multiplier = kernel.multiplier(k);
+            assert!(multiplier.abs() <= 1.0, "{k}: {multiplier}");
+            least = least.min(multiplier);
+            let passed = tau * k.powi(4);
+            if passed < 0.1 {
+                let error = (multiplier - (-passed).exp()).abs();
+                assert!(error < 0.5 * passed * passed + 1e-9, "{passed}: {error}");
+            }
+        }
+        assert!(least > -0.89, "{least}");
+    }
+}

@@ -1,0 +1,306 @@
+//! Direct steps as a scheme.
+
+use std::time::Instant;
+
+use geometry::{
+    Field, Grid, NodeSet, PhaseField, Redistanced, Stored, ZeroSet, distance_from_phase_field,
+    optimal_profile, parallel,
+};
+use serde::{Deserialize, Serialize};
+use solver::{
+    Candidate, DeviceField, DirectRecord, Error, Memory, Problem, Scheme, State, StepRecord,
+    StepSize,
+};
+
+use crate::step::DirectSteps;
+
+/// Phase fields are made this much wider before their zero level is looked for, so that it is well resolved.
+const WIDER: f64 = 3.0;
+/// Fields and numbers in the memory of a state.
+const WHOLE: &str = "direct whole steps";
+const HALF: &str = "direct half steps";
+const REACH: &str = "reach";
+const ENERGY: &str = "energy of the zero level";
+
+/// How long the parts of direct steps are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DirectParams {
+    /// The longest part of a step, over the fourth power of the [reach](geometry::Redistanced::reach) of the interface: so kernels see little of its
+    /// curvature and next to nothing of its other parts. Errors are of second order in it; above `4e-3` they are not small.
+    pub longest: f64,
+}
+
+impl Default for DirectParams {
+    fn default() -> Self {
+        Self { longest: 1e-3 }
+    }
+}
+
+/// Direct steps of second order, made of two runs of first order.
+///
+/// One run makes steps of a size, the other one two steps of half the size for each of these. The flow is what they extrapolate to, `2 s_half - s_whole`
+/// for their signed distances `s`. A time step is divided into parts whose length follows the [reach](DirectParams::longest) of the
+/// interface. A part is not shorter than `17 h^4`, so that the grid resolves its kernel. Each part takes three convolutions.
+///
+/// The phase field is stored on the whole grid. The energy is that of bending, and nothing is held. It is measured on the zero level
+/// ([`geometry::ZeroSet`]). Nothing guarantees that it falls. In the record, `energy_before` and `energy` are `2 tau w` of the energies before and
+/// after the step, and `direct` says what was done.
+#[derive(Default)]
+pub struct Direct<const D: usize> {
+    params: DirectParams,
+    prepared: Option<Prepared<D>>,
+}
+
+/// What is prepared for a grid and an interface width.
+struct Prepared<const D: usize> {
+    grid: Grid<D>,
+    eps: f64,
+    steps: DirectSteps<D>,
+}
+
+/// The distances of both runs, and the reach of the interface.
+struct Runs {
+    whole: Vec<f64>,
+    half: Vec<f64>,
+    reach: f64,
+}
+
+/// Where distances may change; all others stay.
+#[derive(Clone, Copy)]
+struct Free<'a>(Option<&'a NodeSet>);
+
+impl Free<'_> {
+    fn of(self, new: Vec<f64>, old: &[f64]) -> Vec<f64> {
+        let Some(region) = self.0 else {
+            return new;
+        };
+        let kept = region.iter().zip(new).zip(old);
+        kept.map(|((free, new), old)| if free { new } else { *old })
+            .collect()
+    }
+}
+
+impl<const D: usize> Direct<D> {
+    /// The scheme, before it has prepared anything.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The same with parts of another length.
+    ///
+    /// # Errors
+    /// [`geometry::Error`] unless it is positive.
+    pub fn with(params: DirectParams) -> Result<Self, geometry::Error> {
+        geometry::positive("longest part of a direct step", params.longest)?;
+        Ok(Self {
+            params,
+            prepared: None,
+        })
+    }
+
+    fn steps(&mut self, problem: &Problem<D>) -> &mut DirectSteps<D> {
+        let (grid, eps) = (problem.grid, problem.params.eps);
+        let fits = |made: &Prepared<D>| made.grid == grid && made.eps.to_bits() == eps.to_bits();
+        if !self.prepared.as_ref().is_some_and(fits) {
+            self.prepared = None;
+        }
+        let made = self.prepared.get_or_insert_with(|| Prepared {
+            grid,
+            eps,
+            steps: DirectSteps::new(grid),
+        });
+        &mut made.steps
+    }
+}
+
+impl<const D: usize> DirectSteps<D> {
+    /// The distances to the zero level of a function of distances, through a profile that the grid resolves well.
+    fn level(&self, distances: &[f64], eps: f64) -> Redistanced<D> {
+        let wide = |node: usize| -optimal_profile(distances[node], WIDER * eps);
+        self.redistanced(parallel::values(distances.len(), wide))
+    }
+
+    /// Both runs at the start of a flow.
+    fn start(&self, u: &Stored<D>, eps: f64, free: Free<'_>) -> Runs {
+        let values = u.values();
+        let distances = parallel::values(values.len(), |node| {
+            distance_from_phase_field(values[node], eps)
+        });
+        let made = self.level(&distances, eps);
+        let reach = made.reach();
+        let whole = free.of(made.distances, &distances);
+        Runs {
+            half: whole.clone(),
+            whole,
+            reach,
+        }
+    }
+
+    /// Both runs after a part of a step.
+    fn both(&mut self, runs: &Runs, tau: f64, free: Free<'_>) -> Runs {
+        let whole = self.step(&runs.whole, tau);
+        let middle = free.of(self.step(&runs.half, 0.5 * tau).distances, &runs.half);
+        let half = self.step(&middle, 0.5 * tau);
+        Runs {
+            reach: half.reach(),
+            whole: free.of(whole.distances, &runs.whole),
+            half: free.of(half.distances, &runs.half),
+        }
+    }
+}
+
+impl<const D: usize> DirectSteps<D> {
+    /// Both runs after a time step, and in how many parts it was made.
+    fn advance(&mut self, mut runs: Runs, tau: f64, longest: f64, free: Free<'_>) -> (Runs, usize) {
+        let (mut left, mut parts) = (tau, 0);
+        while left > 0.0 {
+            let longest = (longest * runs.reach.powi(4)).max(self.shortest());
+            let part = left / (left / longest).ceil().max(1.0);
+            runs = self.both(&runs, part, free);
+            // The last part is all that is left, whatever rounding says.
+            left = if part < left { left - part } else { 0.0 };
+            parts += 1;
+        }
+        (runs, parts)
+    }
+}
+
+impl Runs {
+    /// What the runs extrapolate to; pure where either is.
+    fn extrapolated(&self) -> Vec<f64> {
+        let (whole, half) = (&self.whole, &self.half);
+        parallel::values(whole.len(), |node| {
+            let (whole, half) = (whole[node], half[node]);
+            if whole.is_finite() && half.is_finite() {
+                2.0 * half - whole
+            } else {
+                half
+            }
+        })
+    }
+
+    /// The largest distance of the two runs, at nodes within a spacing of the zero level.
+    fn apart(&self, spacing: f64) -> f64 {
+        let near = self.half.iter().zip(&self.whole);
+        let near = near.filter(|(half, _)| half.abs() <= spacing);
+        near.map(|(half, whole)| (half - whole).abs())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Refuses what direct steps cannot do.
+fn check<const D: usize>(problem: &Problem<D>, from: &State<D>) -> Result<(), Error> {
+    let what = if problem.held.is_empty() && problem.terms.is_empty() {
+        from.field.nodes().bricks().map(|_| "active bricks")
+    } else if problem.terms.is_empty() {
+        Some("held sizes")
+    } else {
+        Some("terms of the energy besides bending")
+    };
+    what.map_or(Ok(()), |what| Err(Error::NotDirect { what }))
+}
+
+/// The runs that a state remembers.
+fn remembered<const D: usize>(from: &State<D>, eps: f64) -> Result<Option<Runs>, Error> {
+    let Memory { fields, numbers } = &from.memory;
+    let (Some(whole), Some(half)) = (fields.get(WHOLE), fields.get(HALF)) else {
+        return Ok(None);
+    };
+    let distances = |field: &DeviceField<D>| -> Result<Vec<f64>, Error> {
+        let values = field.stored()?.into_values();
+        let distance = |node: usize| distance_from_phase_field(values[node], eps);
+        Ok(parallel::values(values.len(), distance))
+    };
+    Ok(Some(Runs {
+        whole: distances(whole)?,
+        half: distances(half)?,
+        reach: numbers.get(REACH).copied().unwrap_or(f64::INFINITY),
+    }))
+}
+
+/// The Willmore energies of the zero level before and after a step; the former may be known.
+fn energies<const D: usize>(
+    from: &State<D>,
+    before: &Stored<D>,
+    after: &Stored<D>,
+    eps: f64,
+) -> Result<[f64; 2], Error> {
+    let energy = |u: &Stored<D>| -> Result<f64, Error> { Ok(ZeroSet::of(u, eps)?.willmore_energy) };
+    let known = from.memory.numbers.get(ENERGY).copied();
+    Ok([known.map_or_else(|| energy(before), Ok)?, energy(after)?])
+}
+
+impl<const D: usize> Scheme<D> for Direct<D> {
+    fn step(
+        &mut self,
+        problem: &Problem<D>,
+        from: &State<D>,
+        size: StepSize,
+    ) -> Result<Candidate<D>, Error> {
+        let clock = Instant::now();
+        check(problem, from)?;
+        let (eps, free) = (problem.params.eps, Free(problem.region.as_deref()));
+        let longest = self.params.longest;
+        let before = from.stored()?;
+        let steps = self.steps(problem);
+        let runs = match remembered(from, eps)? {
+            Some(runs) => runs,
+            None => steps.start(&before, eps, free),
+        };
+        let (runs, parts) = steps.advance(runs, size.tau, longest, free);
+
+        let stored = |distances: &[f64], free: Free<'_>| -> Result<Stored<D>, Error> {
+            let phase = |node: usize| optimal_profile(distances[node], eps);
+            let values = free.of(parallel::values(distances.len(), phase), before.values());
+            let field = Field::from_values(problem.grid, values);
+            let field = field.map_err(|_| Error::NonFinite {
+                step: from.step + 1,
+                field: "phase field",
+            })?;
+            Ok(Stored::whole(field))
+        };
+        let level = steps.level(&runs.extrapolated(), eps);
+        let now = stored(&level.distances, free)?;
+        let [energy_before, willmore_energy] = energies(from, &before, &now, eps)?;
+        let mut memory = Memory::default();
+        for (name, distances) in [(WHOLE, &runs.whole), (HALF, &runs.half)] {
+            let run = problem.upload(&stored(distances, Free(None))?);
+            memory.fields.insert(name.to_owned(), run);
+        }
+        for (name, number) in [(REACH, runs.reach), (ENERGY, willmore_energy)] {
+            memory.numbers.insert(name.to_owned(), number);
+        }
+        let state = State {
+            field: problem.upload(&now),
+            step: from.step + 1,
+            time: from.time + size.tau,
+            progress: from.progress + size.part(),
+            memory,
+        };
+        let record = StepRecord {
+            step: state.step,
+            time: state.time,
+            tau: size.tau,
+            energy_before: 2.0 * size.tau * energy_before,
+            energy: 2.0 * size.tau * willmore_energy,
+            willmore_energy,
+            direct: Some(DirectRecord {
+                parts,
+                convolutions: 3 * parts,
+                reach: runs.reach,
+                apart: runs.apart(problem.grid.spacing()),
+            }),
+            seconds: clock.elapsed().as_secs_f64(),
+            ..StepRecord::default()
+        };
+        Ok(Candidate {
+            state,
+            tau: size.tau,
+            record: Some(record),
+        })
+    }
+
+    fn name(&self) -> &'static str {
+        "direct"
+    }
+}

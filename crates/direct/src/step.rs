@@ -1,0 +1,87 @@
+//! One direct step, from distances to distances.
+
+use std::f64::consts::{PI, TAU};
+
+use geometry::{DistanceRange, Grid, LevelPoint, Redistanced, parallel};
+use operators::SpectralFilter;
+
+use crate::Kernel;
+use crate::profile::Profile;
+
+/// The size of the shortest step in spacings to the fourth power: the heat kernels are three spacings wide.
+const SHORTEST: f64 = 17.0;
+/// Convolutions of the last sizes of steps, which are prepared.
+const PREPARED: usize = 2;
+
+/// Direct steps on a grid, with what is prepared for their sizes.
+pub(crate) struct DirectSteps<const D: usize> {
+    grid: Grid<D>,
+    range: DistanceRange,
+    prepared: Vec<(Kernel, f64, SpectralFilter)>,
+}
+
+impl<const D: usize> DirectSteps<D> {
+    pub(crate) fn new(grid: Grid<D>) -> Self {
+        Self {
+            grid,
+            range: DistanceRange {
+                precise: Profile::PURE * grid.spacing(),
+                largest: f64::INFINITY,
+            },
+            prepared: Vec::new(),
+        }
+    }
+
+    /// The distances to the zero level of a function, negative where it is.
+    pub(crate) fn redistanced(&self, values: Vec<f64>) -> Redistanced<D> {
+        Redistanced::from_values(self.grid, values, self.range)
+    }
+
+    /// The size of the shortest step whose kernel the grid resolves.
+    pub(crate) fn shortest(&self) -> f64 {
+        SHORTEST * self.grid.spacing().powi(4)
+    }
+
+    /// The distances after a step of size `tau`.
+    pub(crate) fn step(&mut self, distances: &[f64], tau: f64) -> Redistanced<D> {
+        let profile = Profile {
+            width: self.grid.spacing(),
+        };
+        let values = parallel::values(distances.len(), |node| profile.of(distances[node]));
+        let (kernel, filter) = self.filter(tau);
+        let mut made = self.redistanced(filter.apply(&values));
+        let excess = 0.5 * tau * kernel.excess();
+        let shifts: Vec<f64> = made.points.iter().map(|p| excess * nonlinear(p)).collect();
+        let (nearest, distances) = (&made.nearest, &made.distances);
+        made.distances = parallel::values(distances.len(), |node| {
+            let shift = shifts.get(nearest[node] as usize);
+            distances[node] + shift.copied().unwrap_or(0.0)
+        });
+        made
+    }
+
+    /// The kernel of a step, and the convolution with it.
+    fn filter(&mut self, tau: f64) -> (Kernel, SpectralFilter) {
+        let known = |(_, size, _): &&(Kernel, f64, SpectralFilter)| size.to_bits() == tau.to_bits();
+        if let Some((kernel, _, filter)) = self.prepared.iter().find(known) {
+            return (*kernel, filter.clone());
+        }
+        let h = self.grid.spacing();
+        let kernel = Kernel::new(h, tau);
+        let filter = SpectralFilter::from_symbol(&self.grid.shape(), |theta| {
+            let wave = |theta: &f64| if *theta > PI { *theta - TAU } else { *theta };
+            kernel.symbol(theta.iter().map(|theta| (wave(theta) / h).powi(2)).sum())
+        });
+        if self.prepared.len() >= PREPARED {
+            self.prepared.remove(0);
+        }
+        self.prepared.push((kernel, tau, filter.clone()));
+        (kernel, filter)
+    }
+}
+
+/// `h (k1 - k2)^2`, which is `kappa^3` in the plane.
+fn nonlinear<const D: usize>(point: &LevelPoint<D>) -> f64 {
+    let sum = point.mean_curvature();
+    sum * (2.0 * point.squared_curvatures() - sum * sum)
+}
