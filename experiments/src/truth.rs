@@ -252,7 +252,7 @@ pub fn flow<const D: usize>(
 ) -> Result<Trajectory<D>> {
     let Course { name, steps, end } = course;
     let newton = match steps.order {
-        Order::First => NewtonParams::default(),
+        Order::First | Order::Direct(_) => NewtonParams::default(),
         Order::Controlled(STRICT) => NewtonParams {
             tolerance: 0.01,
             cg_tolerance: 0.05,

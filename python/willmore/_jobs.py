@@ -217,6 +217,7 @@ def flow(
     time: float | None = None,
     tolerance: Any = None,
     tau: Any = None,
+    stepper: Literal["minimizing", "direct"] | None = None,
     volume: Any = None,
     area: Any = None,
     length: Any = None,
@@ -250,6 +251,9 @@ def flow(
         Tolerated error of the time steps: a length for the whole flow, or ``"1.5%"`` of the way in each step, which is the default.
     tau : float or str, optional
         Equal time steps, or another rule: see ``willmore flow --help``.
+    stepper : {"minimizing", "direct"}, optional
+        Minimizations with the learned operator (default), or direct steps: convolutions, faster and more accurate on smooth shapes, of the bending
+        energy alone.
     volume, area, length : "keep", float or "90%", optional
         Sizes that stay, or that go to a value or to a part of them. In the plane, `area` is that of the inside.
     reduced_volume : float, optional
@@ -292,6 +296,7 @@ def flow(
         "time": time,
         "tolerance": tolerance,
         "tau": tau,
+        "stepper": stepper,
         "volume": volume,
         "area": area,
         "length": length,

@@ -98,6 +98,23 @@ impl<const D: usize> Direct<D> {
         })
     }
 
+    /// Refuses what direct steps cannot do.
+    ///
+    /// # Errors
+    /// [`Error::NotDirect`] for held sizes, terms of the energy besides bending, and active bricks.
+    pub fn check(problem: &Problem<D>, from: &State<D>) -> Result<(), Error> {
+        let what = if !problem.held.is_empty() {
+            "held sizes"
+        } else if !problem.terms.is_empty() {
+            "terms of the energy besides bending"
+        } else if from.field.nodes().bricks().is_some() {
+            "active bricks"
+        } else {
+            return Ok(());
+        };
+        Err(Error::NotDirect { what })
+    }
+
     fn steps(&mut self, problem: &Problem<D>) -> &mut DirectSteps<D> {
         let (grid, eps) = (problem.grid, problem.params.eps);
         let fits = |made: &Prepared<D>| made.grid == grid && made.eps.to_bits() == eps.to_bits();
@@ -188,18 +205,6 @@ impl Runs {
     }
 }
 
-/// Refuses what direct steps cannot do.
-fn check<const D: usize>(problem: &Problem<D>, from: &State<D>) -> Result<(), Error> {
-    let what = if problem.held.is_empty() && problem.terms.is_empty() {
-        from.field.nodes().bricks().map(|_| "active bricks")
-    } else if problem.terms.is_empty() {
-        Some("held sizes")
-    } else {
-        Some("terms of the energy besides bending")
-    };
-    what.map_or(Ok(()), |what| Err(Error::NotDirect { what }))
-}
-
 /// The runs that a state remembers.
 fn remembered<const D: usize>(from: &State<D>, eps: f64) -> Result<Option<Runs>, Error> {
     let Memory { fields, numbers } = &from.memory;
@@ -238,7 +243,7 @@ impl<const D: usize> Scheme<D> for Direct<D> {
         size: StepSize,
     ) -> Result<Candidate<D>, Error> {
         let clock = Instant::now();
-        check(problem, from)?;
+        Self::check(problem, from)?;
         let (eps, free) = (problem.params.eps, Free(problem.region.as_deref()));
         let longest = self.params.longest;
         let before = from.stored()?;

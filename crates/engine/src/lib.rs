@@ -71,6 +71,7 @@ mod until_stop;
 pub use case::Case;
 pub use controller::{Attempts, Controller, EqualSteps, Verdict};
 pub use current::Current;
+pub use direct::DirectParams;
 pub use edges::round_edges;
 pub use error::Error;
 pub use error_control::ErrorControl;
@@ -83,7 +84,7 @@ pub use record::{
     Record, Values, energy_increases, estimated_time_error, mean_hvp, minimizations, total_hvp,
 };
 pub use run::Run;
-pub use solver::{Held, Helfrich, Target};
+pub use solver::{DirectRecord, Held, Helfrich, Target};
 pub use step_control::StepControl;
 pub use stop::{Progress, Stop, StopRule, StopWhen};
 pub use storage::Storage;

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
+use direct::Direct;
 use fem::FiniteElementStep;
 use mean_curvature::MeanCurvatureStep;
 use model::MeanCurvatureOperator;
@@ -34,8 +35,10 @@ pub(crate) fn of<const D: usize>(
 ) -> Result<Parts<D>, Error> {
     let (kind, grid, storage) = (device.kind(), case.grid(), case.operator.storage);
     let needs_grid = match (case.flow, case.operator.discretization.method) {
-        (Flow::Willmore, Method::Hybrid | Method::Own) => None,
         (Flow::MeanCurvature, _) => Some("mean curvature flows"),
+        (Flow::Willmore, Method::Hybrid | Method::Own) => {
+            matches!(case.steps.order, Order::Direct(_)).then_some("direct steps")
+        }
         (Flow::Willmore, _) => Some("finite elements"),
     };
     if let Some(what) = needs_grid.filter(|_| storage == Storage::Bricks) {
@@ -74,19 +77,32 @@ fn make<const D: usize>(case: &Case<D>, device: &ComputeDevice) -> Result<Parts<
     if case.flow == Flow::Willmore {
         willmore(case, &mut problem, &start)?;
     }
-    let scheme: Box<dyn Scheme<D>> = match (&case.own.scheme, case.flow, case.steps.order) {
+    let scheme = scheme(case, &problem, &start)?;
+    Ok(Parts {
+        problem,
+        start,
+        scheme,
+        elements,
+    })
+}
+
+/// The scheme that makes the steps of a case.
+fn scheme<const D: usize>(
+    case: &Case<D>,
+    problem: &Problem<D>,
+    start: &State<D>,
+) -> Result<Box<dyn Scheme<D>>, Error> {
+    Ok(match (&case.own.scheme, case.flow, case.steps.order) {
         (Some(make), ..) => make(),
         (None, Flow::MeanCurvature, _) => Box::new(MeanCurvatureFlow),
         (None, Flow::Willmore, Order::First) => Box::new(Euler::new()),
         (None, Flow::Willmore, Order::Second | Order::Controlled(_)) => {
             Box::new(SecondOrder::new())
         }
-    };
-    Ok(Parts {
-        problem,
-        start,
-        scheme,
-        elements,
+        (None, Flow::Willmore, Order::Direct(params)) => {
+            Direct::check(problem, start)?;
+            Box::new(Direct::with(params)?)
+        }
     })
 }
 
@@ -121,7 +137,8 @@ fn start<const D: usize>(case: &Case<D>, problem: &Problem<D>) -> Result<State<D
     let bricks = || problem.start_on_bricks(&case.initial);
     let method = case.operator.discretization.method;
     let elements = [Method::FeImplicit, Method::FeSemi].contains(&method);
-    if case.flow == Flow::MeanCurvature || elements {
+    let direct = matches!(case.steps.order, Order::Direct(_));
+    if case.flow == Flow::MeanCurvature || elements || direct {
         return dense();
     }
     Ok(match case.operator.storage {

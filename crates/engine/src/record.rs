@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
-use solver::StepRecord;
+use solver::{DirectRecord, StepRecord};
 
 /// Values of the measures of a case by their names; those that a shape does not have are absent.
 pub type Values = BTreeMap<String, f64>;
@@ -34,7 +34,7 @@ pub struct Record {
     pub moved: f64,
     /// `L2` distance to the initial phase field.
     pub travelled: f64,
-    /// Energies, iterations and times of the minimization; none for mean curvature flow.
+    /// Energies, iterations and times of the minimization, or what a direct step did; none for mean curvature flow.
     pub minimization: Option<StepRecord>,
     /// Values of the case's measures after the step.
     pub measures: Values,
@@ -52,6 +52,11 @@ impl Record {
     /// The Willmore energy before the step, as the scheme measures it.
     pub fn energy_at_rest(&self) -> Option<f64> {
         self.minimization.map(|made| made.energy_at_rest())
+    }
+
+    /// What a direct step did.
+    pub fn direct(&self) -> Option<DirectRecord> {
+        self.minimization?.direct
     }
 
     /// Hessian-vector products; those on coarser grids count by their share of this grid's unknowns.
@@ -135,6 +140,12 @@ pub(crate) fn to_csv(records: &[Record]) -> String {
     ];
     let is_used = |(_, of): &Column<'_>| records.iter().any(|record| of(record).is_some());
     columns.extend(multipliers.into_iter().filter(is_used));
+    let direct = [
+        column("convolutions", |r| Some(r.direct()?.convolutions as f64)),
+        column("reach", |r| Some(r.direct()?.reach)),
+        column("apart", |r| Some(r.direct()?.apart)),
+    ];
+    columns.extend(direct.into_iter().filter(is_used));
     columns.extend([
         column("newton", |r| Some(r.minimization?.newton.newton as f64)),
         column("hvp", Record::hvp),

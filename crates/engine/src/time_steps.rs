@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use direct::DirectParams;
 use geometry::Grid;
 use serde::{Serialize, Serializer};
 
@@ -113,6 +114,8 @@ pub enum Order {
     Second,
     /// In second-order steps whose sizes are controlled; the steps of the rule end when they are due.
     Controlled(ErrorControl),
+    /// By convolutions, without a minimization ([`direct::Direct`]), in as many parts as the reach of the interface asks for.
+    Direct(DirectParams),
 }
 
 impl Order {

@@ -1,14 +1,15 @@
 //! From options to cases: which device and operator, which time steps, which sizes are held, and when it ends.
 
 use engine::{
-    Discretization, ErrorControl, Flow, Held, Helfrich, Operator, Own, Storage, Target, TimeSteps,
+    DirectParams, Discretization, ErrorControl, Flow, Held, Helfrich, Operator, Order, Own,
+    Storage, Target, TimeSteps,
 };
 use model::{Network, Networks};
 use solver::NewtonParams;
 
 use crate::input::{InitialShape, usual_box};
 use crate::job::Job;
-use crate::options::{CommonOptions, FlowOptions, OperatorOptions, WillmoreOptions};
+use crate::options::{CommonOptions, FlowOptions, OperatorOptions, Stepper, WillmoreOptions};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::presentation::Presentation;
@@ -94,7 +95,10 @@ impl OperatorOptions {
 
 impl Job {
     /// The rule for the time steps of Willmore flow unless one is chosen, for this inner step and spacing of the grid.
-    pub(crate) fn usual_rule(&self, inner: f64, spacing: f64) -> StepRule {
+    pub(crate) fn usual_rule(&mut self, inner: f64, spacing: f64) -> StepRule {
+        if self.is_direct() {
+            return StepRule::ByEnergy(None);
+        }
         match self {
             Self::Fair(fair) if fair.takes_small_steps() => StepRule::Graded {
                 first: Fairing::first_step(spacing),
@@ -106,6 +110,12 @@ impl Job {
             },
             _ => StepRule::Controlled,
         }
+    }
+
+    /// Whether steps are direct.
+    pub(crate) fn is_direct(&mut self) -> bool {
+        self.willmore()
+            .is_some_and(|options| options.stepper == Some(Stepper::Direct))
     }
 
     /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
@@ -154,6 +164,7 @@ impl Job {
         let inner = in_box(self.input().box_side.unwrap_or(usual_side));
         let usual_inner = in_box(usual_side);
         let usual = self.usual_rule(inner, grid.spacing());
+        let direct = self.is_direct();
         let rule = match self.willmore() {
             Some(options) => {
                 let rule = options.tau.unwrap_or(usual);
@@ -176,6 +187,10 @@ impl Job {
                 control.first = Some((usual_inner / 16.0).min(16.0 * scales.eps.powi(4)));
                 TimeSteps::controlled(control)
             }
+            rule if direct => TimeSteps {
+                order: Order::Direct(DirectParams::default()),
+                ..rule.into()
+            },
             rule => TimeSteps {
                 longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
                 ..rule.into()

@@ -76,10 +76,10 @@ pub use named::{one_line, options_of};
 pub use notes::{About, NetworkNote, RunNotes};
 pub use options::{
     CheckOptions, CommonOptions, FairOptions, FieldKind, FlowOptions, ForceOption, InpaintOptions,
-    InputOptions, Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions, TrainOptions,
-    WillmoreOptions,
+    InputOptions, Inside, McfOptions, OperatorOptions, RunOptions, SampleOptions, Stepper,
+    TrainOptions, WillmoreOptions,
 };
-pub use outcome::{GridSummary, Outcome, Summary, TimeAccuracy, progress};
+pub use outcome::{DirectReport, GridSummary, Outcome, Summary, TimeAccuracy, progress};
 pub use page::write as write_page;
 pub use parts::{PartFate, PartReport};
 pub use presentation::Topology;

@@ -94,6 +94,17 @@ pub enum Inside {
     Light,
 }
 
+/// What makes the time steps of Willmore flow.
+#[derive(ValueEnum, Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stepper {
+    /// Minimizations with the learned operator; the energy falls
+    #[default]
+    Minimizing,
+    /// Convolutions without a minimization: faster and more accurate on smooth shapes, but nothing guarantees that the energy falls
+    Direct,
+}
+
 /// The kind of the values of a field.
 #[derive(ValueEnum, Serialize, Clone, Copy, Debug, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
@@ -277,6 +288,22 @@ pub struct WillmoreOptions {
     /// `steps` or `time` ends the run.
     #[arg(long, value_name = "TAU", help_heading = FLOW, hide_short_help = true)]
     pub tau: Option<StepRule>,
+
+    /// What makes the time steps: minimizing or direct [default: minimizing]
+    ///
+    /// minimizing minimizes an energy with the learned operator in each step. direct convolves the signed distance and measures it anew, in as many parts
+    /// of a step as the curvature asks for. Direct steps are of the bending energy alone: they hold no sizes and take no tension, pressure or
+    /// spontaneous curvature. They store the whole grid. The shape should be smooth: a corner costs many short parts. The default of `tau` is
+    /// auto for them.
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_enum,
+        hide_possible_values = true,
+        help_heading = FLOW,
+        hide_short_help = true
+    )]
+    pub stepper: Option<Stepper>,
 
     /// Tolerated error of controlled time steps, a LENGTH or PERCENT [default: 1.5%]
     ///

@@ -72,6 +72,9 @@ pub struct Summary {
     /// What controlled steps say of themselves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_steps: Option<TimeAccuracy>,
+    /// What direct steps say of themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direct_steps: Option<DirectReport>,
     /// Steps that were made shorter than their rule wanted them.
     pub shortened_steps: usize,
     /// The energy at the beginning; mean curvature flow has none.
@@ -119,6 +122,17 @@ pub struct TimeAccuracy {
     pub longest_displacement_in_widths: f64,
 }
 
+/// What direct steps say of themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DirectReport {
+    /// Convolutions of the whole grid.
+    pub convolutions: usize,
+    /// How far the run of half parts is from that of whole parts at the end: more than the time error of the result, which is extrapolated.
+    pub apart: f64,
+    /// Steps after which the energy was higher than before, which nothing excludes.
+    pub energy_increases: usize,
+}
+
 /// The grid of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridSummary {
@@ -156,6 +170,7 @@ impl Summary {
         let mut text = Vec::new();
         text.extend(self.of_energy());
         text.extend(self.of_time());
+        text.extend(self.of_direct());
         text.extend(self.of_sizes());
         text.extend(self.mesh.as_ref().map(of_mesh));
         text.extend(self.mesh.iter().flat_map(|mesh| of_parts(&mesh.parts)));
@@ -179,6 +194,22 @@ impl Summary {
         let (error, path) = (accuracy.estimated_error?, accuracy.path);
         Some(format!(
             "time error about {error:.1e} (estimated), after a way of {path:.3}"
+        ))
+    }
+
+    fn of_direct(&self) -> Option<String> {
+        let DirectReport {
+            convolutions,
+            apart,
+            energy_increases,
+        } = self.direct_steps?;
+        let energy = match energy_increases {
+            0 => "the energy fell in each step".to_owned(),
+            1 => "the energy rose in one step".to_owned(),
+            some => format!("the energy rose in {some} steps"),
+        };
+        Some(format!(
+            "{convolutions} convolutions, time error below about {apart:.1e}; {energy}, which direct steps do not guarantee"
         ))
     }
 

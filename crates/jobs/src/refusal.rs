@@ -30,6 +30,11 @@ pub enum Refusal {
     /// A tolerance, for time steps that no error controls.
     #[error("`tolerance` {0} is for controlled time steps: give `tau` controlled, or leave it out")]
     Tolerance(Amount),
+    /// Controlled steps, of a stepper that estimates no errors of steps.
+    #[error(
+        "`tau` controlled is for minimizing steps: give another rule for direct ones, such as auto, or leave out `stepper`"
+    )]
+    ControlledDirect,
     /// A ramp of so many steps, but no size that goes to a target.
     #[error(
         "`ramp` {0} is for sizes that go to a target: give `length`, `area`, `volume` or `reduced_volume`, or leave it out"

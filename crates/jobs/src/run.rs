@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::time::Instant;
 
-use engine::{Checkpoints, Event, Observer, Store, estimated_time_error};
+use engine::{Checkpoints, Event, Observer, Store, energy_increases, estimated_time_error};
 use files::FileSystem as _;
 use geometry::measure::touches_side;
 use solver::StepEstimates;
@@ -16,7 +16,7 @@ use crate::file::Input;
 use crate::made::{Made, Shape};
 use crate::notes::{About, NetworkNote, RunNotes};
 use crate::options::{InputOptions, RunOptions};
-use crate::outcome::{GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
+use crate::outcome::{DirectReport, GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
 use crate::page;
 use crate::paths::extension;
 use crate::prelude::*;
@@ -215,6 +215,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             steps: run.steps(),
             time: run.time(),
             time_steps: time_accuracy(run.records(), eps).filter(|_| has_interface(u)),
+            direct_steps: direct_report(run.records()),
             shortened_steps: run.records().iter().filter(|r| is_shortened(r)).count(),
             first_energy,
             energy,
@@ -458,6 +459,17 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<TimeAccuracy> {
         estimated_error: estimated_time_error(records),
         path: estimates.map(|e| e.motion).sum::<f64>(),
         longest_displacement_in_widths: longest / eps,
+    })
+}
+
+/// What direct steps say of themselves.
+fn direct_report(records: &[Record]) -> Option<DirectReport> {
+    let steps = records.iter().filter_map(Record::direct);
+    let last = steps.clone().last()?;
+    Some(DirectReport {
+        convolutions: steps.map(|step| step.convolutions).sum(),
+        apart: last.apart,
+        energy_increases: energy_increases(records),
     })
 }
 

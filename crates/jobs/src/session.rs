@@ -8,7 +8,7 @@ use crate::input::{InitialShape, Loaded, Opened, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::notes::RunNotes;
-use crate::options::{ForceOption, InputOptions, OperatorOptions};
+use crate::options::{ForceOption, InputOptions, OperatorOptions, Stepper};
 use crate::outcome::Outcome;
 use crate::paths::absolute;
 use crate::plane::Plane;
@@ -60,6 +60,10 @@ impl Job {
             && options.tau.unwrap_or(usual) != StepRule::Controlled
         {
             return Err(Refusal::Tolerance(tolerance).into());
+        }
+        let rule = options.tau.unwrap_or(usual);
+        if options.stepper == Some(Stepper::Direct) && rule == StepRule::Controlled {
+            return Err(Refusal::ControlledDirect.into());
         }
         let sizes = [options.length, options.area, options.volume];
         if let Some(ramp) = options.ramp

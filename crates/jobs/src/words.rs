@@ -98,13 +98,16 @@ fn answered(value: Value) -> Value {
     }
 }
 
-const COLUMNS: [(&str, &str); 9] = [
+const COLUMNS: [(&str, &str); 12] = [
     ("time", "time after the step"),
     ("tau", "time step"),
     ("energy_before", "objective before"),
     ("energy", "objective after"),
     ("willmore_energy", "Willmore energy"),
     ("displacement", "root mean square displacement"),
+    ("convolutions", "convolutions"),
+    ("reach", "reach of the interface"),
+    ("apart", "distance of the two runs"),
     ("newton", "Newton steps"),
     ("hvp", "Hessian products"),
     ("halvings", "times shortened"),
@@ -248,7 +251,7 @@ const NUMBERS: [(&str, &str); 21] = [
     ("/steps", "Steps in time"),
 ];
 
-const REST: [(&str, &str); 11] = [
+const REST: [(&str, &str); 14] = [
     (
         "/shortened_steps",
         "Steps that were made shorter than they were to be",
@@ -264,6 +267,18 @@ const REST: [(&str, &str); 11] = [
     (
         "/time_steps/longest_displacement_in_widths",
         "Longest way within a stage of a step, in widths of the interface",
+    ),
+    (
+        "/direct_steps/convolutions",
+        "Convolutions of the whole grid",
+    ),
+    (
+        "/direct_steps/apart",
+        "Distance of the runs of whole and of half parts at the end, more than the error of the time steps, in units of the input",
+    ),
+    (
+        "/direct_steps/energy_increases",
+        "Steps after which the energy was higher than before",
     ),
     ("/grid/cells", "Cells along a side of the box"),
     ("/grid/spacing", "Side of a cell, in units of the input"),
