@@ -8,6 +8,7 @@ pub mod mcf_cross;
 pub mod rectangle;
 pub mod cross;
 pub mod work_precision;
+pub mod direct_step;
 pub mod vesicles;
 pub mod elastica;
 pub mod ellipse_orders;

@@ -12,7 +12,7 @@ use solver::{
     StepSize,
 };
 
-use crate::step::DirectSteps;
+use crate::step::{DirectSteps, Needed};
 
 /// Phase fields are made this much wider before their zero level is looked for, so that it is well resolved.
 const WIDER: f64 = 3.0;
@@ -134,7 +134,7 @@ impl<const D: usize> DirectSteps<D> {
     /// The distances to the zero level of a function of distances, through a profile that the grid resolves well.
     fn level(&self, distances: &[f64], eps: f64) -> Redistanced<D> {
         let wide = |node: usize| -optimal_profile(distances[node], WIDER * eps);
-        self.redistanced(parallel::values(distances.len(), wide))
+        self.redistanced(parallel::values(distances.len(), wide), Needed::All)
     }
 
     /// Both runs at the start of a flow.
@@ -154,10 +154,12 @@ impl<const D: usize> DirectSteps<D> {
     }
 
     /// Both runs after a part of a step.
-    fn both(&mut self, runs: &Runs, tau: f64, free: Free<'_>) -> Runs {
-        let whole = self.step(&runs.whole, tau);
-        let middle = free.of(self.step(&runs.half, 0.5 * tau).distances, &runs.half);
-        let half = self.step(&middle, 0.5 * tau);
+    fn both(&mut self, runs: &Runs, tau: f64, free: Free<'_>, needed: Needed) -> Runs {
+        let whole = self.step(&runs.whole, tau, needed);
+        let middle = self.step(&runs.half, 0.5 * tau, Needed::Near);
+        let middle = free.of(middle.distances, &runs.half);
+        // All distances, for the reach.
+        let half = self.step(&middle, 0.5 * tau, Needed::All);
         Runs {
             reach: half.reach(),
             whole: free.of(whole.distances, &runs.whole),
@@ -173,9 +175,14 @@ impl<const D: usize> DirectSteps<D> {
         while left > 0.0 {
             let longest = (longest * runs.reach.powi(4)).max(self.shortest());
             let part = left / (left / longest).ceil().max(1.0);
-            runs = self.both(&runs, part, free);
             // The last part is all that is left, whatever rounding says.
             left = if part < left { left - part } else { 0.0 };
+            let needed = if left > 0.0 {
+                Needed::Near
+            } else {
+                Needed::All
+            };
+            runs = self.both(&runs, part, free, needed);
             parts += 1;
         }
         (runs, parts)

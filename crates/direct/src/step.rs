@@ -13,10 +13,18 @@ const SHORTEST: f64 = 17.0;
 /// Convolutions of the last sizes of steps, which are prepared.
 const PREPARED: usize = 2;
 
+/// How far from the zero level the distances of a step are needed.
+#[derive(Clone, Copy)]
+pub(crate) enum Needed {
+    /// As far as the next step convolves.
+    Near,
+    /// Everywhere.
+    All,
+}
+
 /// Direct steps on a grid, with what is prepared for their sizes.
 pub(crate) struct DirectSteps<const D: usize> {
     grid: Grid<D>,
-    range: DistanceRange,
     prepared: Vec<(Kernel, f64, SpectralFilter)>,
 }
 
@@ -24,17 +32,18 @@ impl<const D: usize> DirectSteps<D> {
     pub(crate) fn new(grid: Grid<D>) -> Self {
         Self {
             grid,
-            range: DistanceRange {
-                precise: Profile::PURE * grid.spacing(),
-                largest: f64::INFINITY,
-            },
             prepared: Vec::new(),
         }
     }
 
     /// The distances to the zero level of a function, negative where it is.
-    pub(crate) fn redistanced(&self, values: Vec<f64>) -> Redistanced<D> {
-        Redistanced::from_values(self.grid, values, self.range)
+    pub(crate) fn redistanced(&self, values: Vec<f64>, needed: Needed) -> Redistanced<D> {
+        let precise = Profile::PURE * self.grid.spacing();
+        let largest = match needed {
+            Needed::Near => precise,
+            Needed::All => f64::INFINITY,
+        };
+        Redistanced::from_values(self.grid, values, DistanceRange { precise, largest })
     }
 
     /// The size of the shortest step whose kernel the grid resolves.
@@ -42,14 +51,14 @@ impl<const D: usize> DirectSteps<D> {
         SHORTEST * self.grid.spacing().powi(4)
     }
 
-    /// The distances after a step of size `tau`.
-    pub(crate) fn step(&mut self, distances: &[f64], tau: f64) -> Redistanced<D> {
+    /// The distances after a step of size `tau`; infinite where they are not needed.
+    pub(crate) fn step(&mut self, distances: &[f64], tau: f64, needed: Needed) -> Redistanced<D> {
         let profile = Profile {
             width: self.grid.spacing(),
         };
         let values = parallel::values(distances.len(), |node| profile.of(distances[node]));
         let (kernel, filter) = self.filter(tau);
-        let mut made = self.redistanced(filter.apply(&values));
+        let mut made = self.redistanced(filter.apply(&values), needed);
         let excess = 0.5 * tau * kernel.excess();
         let shifts: Vec<f64> = made.points.iter().map(|p| excess * nonlinear(p)).collect();
         let (nearest, distances) = (&made.nearest, &made.distances);

@@ -35,6 +35,12 @@ struct Circle {
 }
 
 impl Circle {
+    /// The squared distance to the point.
+    fn squared(&self, x: [f64; 2]) -> f64 {
+        let [a, b] = [0, 1].map(|axis| x[axis] - self.point[axis]);
+        a * a + b * b
+    }
+
     fn signed_distance(&self, x: [f64; 2]) -> f64 {
         let [a, b] = [0, 1].map(|axis| x[axis] - self.point[axis]);
         let along = a * self.normal[0] + b * self.normal[1];
@@ -149,18 +155,22 @@ impl Curve {
     /// least 4096 points of the curve.
     pub fn signed_distance(&self) -> impl Fn([f64; 2]) -> f64 + Send + Sync + use<> {
         const FEWEST: usize = 4096;
+        /// Points that are passed over together where they are far away.
+        const BLOCK: usize = 16;
         let points = self.grid.points.max(FEWEST.div_ceil(self.grid.folds));
-        let circles = self
-            .with_points(points.next_multiple_of(2))
-            .osculating_circles();
+        let finer = self.with_points(points.next_multiple_of(2));
+        let circles = finer.osculating_circles();
+        // No point of a block is farther than this from its middle one.
+        let reach = (BLOCK / 2) as f64 * self.length() / circles.len() as f64;
         move |x| {
-            let squared = |circle: &Circle| {
-                let [a, b] = [0, 1].map(|axis| x[axis] - circle.point[axis]);
-                a * a + b * b
-            };
-            let nearer = |a: &&Circle, b: &&Circle| squared(a).total_cmp(&squared(b));
-            let nearest = circles.iter().min_by(nearer).expect("a curve has points");
-            nearest.signed_distance(x)
+            let middle = |block: &[Circle]| block[block.len() / 2].squared(x);
+            let blocks = || circles.chunks(BLOCK);
+            let least = blocks().map(middle).fold(f64::INFINITY, f64::min);
+            let farthest = (least.sqrt() + reach).powi(2);
+            let near = blocks().filter(|block| middle(block) <= farthest);
+            let nearer = |a: &&Circle, b: &&Circle| a.squared(x).total_cmp(&b.squared(x));
+            let nearest = near.flatten().min_by(nearer);
+            nearest.expect("a curve has points").signed_distance(x)
         }
     }
 

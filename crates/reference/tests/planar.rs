@@ -211,3 +211,22 @@ fn what_cannot_be_computed_is_refused() {
     let vanished = evolve(&circle, Flow::MeanCurvature, &[0.6], &ACCURACY);
     assert!(matches!(vanished, Err(Error::StepTooShort { .. })));
 }
+
+#[test]
+fn signed_distances_are_distances_with_a_sign() {
+    let shape = Shape::ellipse(0.4, 0.25).unwrap();
+    let curve = willmore(&shape, 1e-4);
+    let distance = curve.signed_distance();
+    for k in 0..200_u32 {
+        let [a, b] = [0.754_877, 0.569_840].map(|turn| f64::fract(f64::from(k) * turn));
+        let x = [1.2 * a - 0.6, 1.2 * b - 0.6];
+        let found = distance(x);
+        let error = (found.abs() - curve.largest_distance_of(&[x])).abs();
+        assert!(error < 1e-9, "{x:?}: {found}");
+        let level = (x[0] / 0.4).powi(2) + (x[1] / 0.25).powi(2) - 1.0;
+        assert!(
+            level.abs() < 0.1 || (found > 0.0) == (level > 0.0),
+            "{x:?}: {found}"
+        );
+    }
+}
