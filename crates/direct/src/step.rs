@@ -94,3 +94,48 @@ fn nonlinear<const D: usize>(point: &LevelPoint<D>) -> f64 {
     let sum = point.mean_curvature();
     sum * (2.0 * point.squared_curvatures() - sum * sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By which part a step of the size `x R^4` moves a circle of radius `R` too far; if it is a sphere, how far it moves over `x R`.
+    fn error_of_step<const D: usize>(cells: usize, x: f64) -> f64 {
+        const RADIUS: f64 = 0.5;
+        let grid = Grid::<D>::centred(cells, 2.0).unwrap();
+        let distance = |node: usize| {
+            let square = grid.node(node).iter().map(|x| x * x).sum::<f64>();
+            square.sqrt() - RADIUS
+        };
+        let distances = parallel::values(grid.len(), distance);
+        let tau = x * RADIUS.powi(4);
+        let made = DirectSteps::new(grid).step(&distances, tau, Needed::Near);
+        // The mean of the distances at the old level is minus the displacement.
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (old, new) in distances.iter().zip(&made.distances) {
+            if old.abs() < grid.spacing() {
+                sum += old - new;
+                count += 1.0;
+            }
+        }
+        let moved = sum / count;
+        match D {
+            2 => moved / ((RADIUS.powi(4) + 2.0 * tau).powf(0.25) - RADIUS) - 1.0,
+            _ => moved / (x * RADIUS),
+        }
+    }
+
+    #[test]
+    fn circles_move_too_slowly_by_a_part_that_grows_with_the_step() {
+        for (x, error) in [(3e-4, -0.0058), (1e-3, -0.0240), (3e-3, -0.114)] {
+            let found = error_of_step::<2>(192, x);
+            assert!((found / error - 1.0).abs() < 0.05, "{x}: {found}");
+        }
+    }
+
+    #[test]
+    fn spheres_do_not_move() {
+        let found = error_of_step::<3>(64, 1e-3);
+        assert!(found.abs() < 1e-4, "{found}");
+    }
+}

@@ -288,7 +288,6 @@ fn carry<const D: usize>(
         square
     };
     let limit = largest * largest;
-    let h = grid.spacing();
     let mut squares = parallel::values(nearest.len(), |node| match nearest[node] {
         NOWHERE => limit,
         number => squared(grid.node(node), number),
