@@ -63,6 +63,46 @@ fn tolerances_are_lengths_in_the_units_of_the_input() {
     assert!((ratio / 128.0 - 1.0).abs() < 1e-9, "{other}");
 }
 
+/// Direct steps reach the state of minimizing ones, and say what they cost and that nothing guarantees their energy.
+#[test]
+fn direct_steps_reach_the_same_shape_and_say_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ellipse(&folder.path().join("ellipse.npy"));
+    let flow = |name: &str, options: &[&str]| {
+        let run = [
+            "flow",
+            "ellipse.npy",
+            "--box-side",
+            "0.75",
+            "--time",
+            "1e-4",
+            "--output",
+            name,
+        ];
+        outcome(folder.path(), &[&run[..], options].concat())
+    };
+    let direct = flow("direct", &["--stepper", "direct"]);
+    let minimizing = flow("minimizing", &[]);
+    let area = |outcome: &Value| number(outcome, "/area");
+    assert!(
+        (area(&direct) / area(&minimizing) - 1.0).abs() < 1e-3,
+        "{direct} {minimizing}"
+    );
+    let convolutions = column(&folder.path().join("direct"), "convolutions");
+    let all = number(&direct, "/direct_steps/convolutions");
+    assert!(
+        (convolutions.iter().sum::<f64>() - all).abs() < 0.5 && all > 10.0,
+        "{direct}"
+    );
+    assert!(number(&direct, "/direct_steps/apart") < 1e-3, "{direct}");
+    assert_eq!(direct["direct_steps"]["energy_increases"], 0, "{direct}");
+    let error = number(&minimizing, "/time_steps/estimated_error");
+    assert!(
+        error > 0.0 && minimizing.get("direct_steps").is_none(),
+        "{minimizing}"
+    );
+}
+
 /// From a corner controlled steps are made again until their error is what it may be, which is nothing to tell.
 #[test]
 fn controlled_steps_are_not_said_to_be_shortened() {

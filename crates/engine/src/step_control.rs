@@ -298,7 +298,7 @@ impl<const D: usize> Controller<D> for StepControl {
     }
 
     fn needs_estimates(&self) -> bool {
-        matches!(self.steps.order, Order::Controlled(_))
+        self.controlled.is_some()
     }
 }
 

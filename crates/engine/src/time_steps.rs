@@ -134,6 +134,16 @@ impl TimeSteps {
     }
 }
 
+impl TimeSteps {
+    /// Direct steps by a rule, which errors cannot control.
+    pub fn direct(rule: StepRule, params: DirectParams) -> Self {
+        Self {
+            order: Order::Direct(params),
+            ..rule.into()
+        }
+    }
+}
+
 impl From<StepRule> for TimeSteps {
     fn from(rule: StepRule) -> Self {
         let order = match rule {

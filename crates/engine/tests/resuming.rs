@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::common::{TAU, case, device, disc, divided, finished, square};
 use crate::held::driven;
 use engine::{
-    Case, Checkpoints, Error, ErrorControl, Event, Flow, Method, Observer, Order, Samples,
-    StepRule, Stop, Store, TimeSteps, Trajectory,
+    Case, Checkpoints, DirectParams, Error, ErrorControl, Event, Flow, Method, Observer, Order,
+    Record, Run, Samples, StepRule, Stop, Store, Target, TimeSteps, Trajectory,
 };
 use runs::{Interrupt, RunDirectory};
 use serde_json::Value;
@@ -262,6 +262,40 @@ fn a_controlled_run_continues_with_the_same_bytes() {
         resumed(&reference, &folder, &samples);
         assert_eq!(reference.steps(), 2);
     }
+}
+
+/// Direct steps of a region: the distances of both runs are in the checkpoint.
+#[test]
+fn a_direct_run_continues_with_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let mut direct = case(Flow::Willmore, Method::Hybrid, square(128));
+    let params = DirectParams { longest: 4e-3 };
+    direct.steps = TimeSteps::direct(StepRule::ByEnergy(Some(TAU / 8.0)), params);
+    let grid = *direct.grid();
+    let right = (0..grid.len()).map(|node| grid.node(node)[0] > -0.1);
+    direct.region = Some(right.collect());
+    let samples = Samples::every(1);
+    let reference = trajectory(&direct, &root.path().join("whole"), &samples);
+    let made = |record: &Record| record.direct().map(|direct| direct.convolutions);
+    assert!(
+        reference
+            .records
+            .iter()
+            .all(|record| made(record) >= Some(3))
+    );
+    let folder = root.path().join("interrupted");
+    interrupted(&direct, &folder, &samples, 2);
+    resumed(&reference, &folder, &samples);
+
+    let mut controlled = direct.clone();
+    controlled.steps.rule = StepRule::Controlled;
+    let refused = Run::new(controlled, &device())
+        .err()
+        .expect("it is refused");
+    assert!(matches!(refused, Error::NoEstimates { .. }), "{refused}");
+    direct.held.volume = Some(Target::keep(0.2));
+    let refused = Run::new(direct, &device()).err().expect("it is refused");
+    assert!(refused.to_string().contains("held sizes"), "{refused}");
 }
 
 /// A region, steps by the energy and an application's notes: from the checkpoint alone.

@@ -1,8 +1,8 @@
 //! From options to cases: which device and operator, which time steps, which sizes are held, and when it ends.
 
 use engine::{
-    DirectParams, Discretization, ErrorControl, Flow, Held, Helfrich, Operator, Order, Own,
-    Storage, Target, TimeSteps,
+    DirectParams, Discretization, ErrorControl, Flow, Held, Helfrich, Operator, Own, Storage,
+    Target, TimeSteps,
 };
 use model::{Network, Networks};
 use solver::NewtonParams;
@@ -187,10 +187,7 @@ impl Job {
                 control.first = Some((usual_inner / 16.0).min(16.0 * scales.eps.powi(4)));
                 TimeSteps::controlled(control)
             }
-            rule if direct => TimeSteps {
-                order: Order::Direct(DirectParams::default()),
-                ..rule.into()
-            },
+            rule if direct => TimeSteps::direct(rule, DirectParams::default()),
             rule => TimeSteps {
                 longest_move: (flow == Flow::Willmore).then_some(LONGEST_MOVE),
                 ..rule.into()

@@ -71,7 +71,7 @@ pub enum Error {
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
     #[error(
-        "direct steps are of the bending energy alone on the whole grid, without {what}; choose another stepper"
+        "direct steps are of the bending energy alone on the whole grid, without {what}; use minimizing steps"
     )]
     NotDirect { what: &'static str },
     /// What a step of mean curvature flow refuses: a grid, scales, bricks.

@@ -72,7 +72,8 @@
 //! - [`mean_curvature`]: the trait of the inner step, its calibration,
 //! - [`model`]: learned operators,
 //! - [`fem`]: finite elements,
-//! - [`solver`]: one time step,
+//! - [`solver`]: one time step by minimizations,
+//! - [`direct`]: one time step by convolutions,
 //! - [`engine`]: cases and the loop over steps,
 //! - [`jobs`]: from files and options to results,
 //! - [`surfaces`], [`volumes`]: meshes, segmentations,
@@ -87,7 +88,7 @@ pub mod prelude;
 
 pub use builder::{Error, Kept, Willmore};
 pub use {
-    engine, fem, geometry, jobs, linearize, mean_curvature, model, operators, runs, solver,
+    direct, engine, fem, geometry, jobs, linearize, mean_curvature, model, operators, runs, solver,
     surfaces, volumes,
 };
 

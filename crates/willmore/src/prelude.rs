@@ -2,6 +2,7 @@
 
 pub use crate::Error as FlowError;
 pub use crate::{Kept, Willmore};
+pub use direct::{Direct, DirectParams};
 pub use engine::{
     Attempts, Case, Checkpoints, Controller, Current, Discretization, EqualSteps, ErrorControl,
     Event, Formulation, Measure, Method, Observer, Operator, Order, Own, Progress, Record, Run,

@@ -178,10 +178,9 @@ impl Way {
         // As many to each comparison as have nearly the wanted size.
         let parts = |tau: f64| (every / tau).round().max(1.0);
         match self {
-            Self::Direct(longest) | Self::ThenDirect(longest) => TimeSteps {
-                order: Order::Direct(DirectParams { longest }),
-                ..equal(1.0)
-            },
+            Self::Direct(longest) | Self::ThenDirect(longest) => {
+                TimeSteps::direct(StepRule::Constant(every), DirectParams { longest })
+            }
             Self::Controlled(_, control) => TimeSteps {
                 order: Order::Controlled(control),
                 ..equal(1.0)
@@ -309,12 +308,17 @@ impl Start {
     fn ways(&self) -> Vec<(usize, f64, Way)> {
         let [coarse, fine] = if self.quick { [32, 64] } else { truth::CELLS };
         let mut all = Vec::new();
-        for &longest in &LONGEST[..if self.quick { 1 } else { LONGEST.len() }] {
+        // At corners parts are short, and on the finer grid there are many of them.
+        let longest = match (self.quick, &self.corners) {
+            (true, _) => &LONGEST[..1],
+            (false, Some(_)) => &LONGEST[..2],
+            (false, None) => &LONGEST[..],
+        };
+        for &longest in longest {
             let side = if self.wide { 3.0 } else { self.side };
             all.push((coarse, side, Way::Direct(longest)));
-            // Kernels must not see the periodic images, and at corners parts are short: on the finer grid there are many of them.
-            let cheap = !self.wide && self.corners.is_none();
-            if cheap || longest > 3e-3 {
+            // In a small box kernels see the periodic images unless parts are short.
+            if self.corners.is_none() && (!self.wide || longest > 3e-3) {
                 all.push((fine, self.side, Way::Direct(longest)));
             }
         }
