@@ -1,6 +1,7 @@
 //! How much of the cells of a lattice a surface encloses, and surfaces that enclose as much near every place.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use glam::{DAffine3, DMat3};
 use rayon::prelude::*;
@@ -22,6 +23,8 @@ const REACH: f64 = 3.0;
 const MOST_CELLS: f64 = 256.0;
 /// Cells are counted up to this number.
 const FARTHEST: f64 = 1e9;
+/// Triangles are cut in pieces of this many, on several threads.
+const CHUNK: usize = 1 << 12;
 /// Volumes of less than this part of a cell are rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -59,20 +62,27 @@ impl Filling {
     pub fn of(mesh: &TriangleMesh, cells: Cells) -> Option<Self> {
         let to_cells = cells.0.inverse();
         let sign = cells.0.matrix3.determinant().signum();
-        let mut pieces = Vec::new();
-        for &face in &mesh.faces {
-            let corners = mesh.corners(face).map(|x| to_cells.transform_point3(x));
-            let [a, b, c] = corners;
-            let reach = (b - a).abs().max((c - a).abs()).max_element();
-            let is_near = corners.iter().all(|x| x.abs().max_element() < FARTHEST);
-            if !(reach <= MOST_CELLS && is_near) {
-                return None;
+        let of_faces = |faces: &[[u32; 3]]| {
+            let mut pieces = Vec::new();
+            for &face in faces {
+                let corners = mesh.corners(face).map(|x| to_cells.transform_point3(x));
+                let [a, b, c] = corners;
+                let reach = (b - a).abs().max((c - a).abs()).max_element();
+                let is_near = corners.iter().all(|x| x.abs().max_element() < FARTHEST);
+                if !(reach <= MOST_CELLS && is_near) {
+                    return None;
+                }
+                cut(&corners, 0, [0; 3], &mut |cell, polygon| {
+                    pieces.push(Piece::of(cell, polygon, sign));
+                });
             }
-            cut(&corners, 0, [0; 3], &mut |cell, polygon| {
-                pieces.push(Piece::of(cell, polygon, sign));
-            });
-        }
-        Some(Self { cells, pieces })
+            Some(pieces)
+        };
+        let pieces: Option<Vec<Vec<Piece>>> = mesh.faces.par_chunks(CHUNK).map(of_faces).collect();
+        Some(Self {
+            cells,
+            pieces: pieces?.concat(),
+        })
     }
 
     /// By whole cells in rows along the last axis: those up to each of these cells are added, or taken away.
@@ -217,7 +227,8 @@ impl TriangleMesh {
 struct Bins {
     origin: Vector,
     width: f64,
-    number: HashMap<[i64; 3], usize>,
+    /// Of each bin, in ascending order.
+    keys: Vec<[i64; 3]>,
     all: Vec<Bin>,
     /// The bins within reach of each bin.
     near: Vec<Vec<usize>>,
@@ -235,21 +246,27 @@ struct Heap {
     sum: f64,
     /// The sum of the absolute values of the weights.
     size: f64,
-    /// The sum of the absolute values of the weights times the places.
-    moment: Vector,
+    /// The sum of the absolute values of the weights times the places; after [`Heap::finish`] the middle of the places.
+    middle: Vector,
 }
 
 impl Heap {
     fn add(&mut self, weight: f64, x: Vector) {
         self.sum += weight;
         self.size += weight.abs();
-        self.moment += weight.abs() * x;
+        self.middle += weight.abs() * x;
+    }
+
+    fn finish(&mut self) {
+        if self.size > 0.0 {
+            self.middle /= self.size;
+        }
     }
 
     /// All that is there, times the value of a Gaussian about `x` in the middle.
     fn seen_from(&self, x: Vector, width: f64) -> f64 {
         if self.size > 0.0 {
-            let far = x.distance(self.moment / self.size) / width;
+            let far = x.distance(self.middle) / width;
             self.sum * (-0.5 * far * far).exp()
         } else {
             0.0
@@ -280,21 +297,24 @@ impl Bins {
                 bin.area.add(third, x);
             }
         }
-        let keys: Vec<[i64; 3]> = bins.keys().copied().collect();
-        let number = keys.iter().copied().zip(0..).collect();
-        let near = keys.par_iter().map(|&key| near(key, &number));
+        for bin in bins.values_mut() {
+            bin.missing.finish();
+            bin.area.finish();
+        }
+        let (keys, all): (Vec<_>, Vec<_>) = bins.into_iter().unzip();
         Self {
             origin,
             width,
-            near: near.collect(),
-            all: bins.into_values().collect(),
-            number,
+            near: near(&keys),
+            keys,
+            all,
         }
     }
 
     /// The missing volume over the area about a vertex.
     fn average(&self, x: Vector) -> f64 {
-        let Some(&own) = self.number.get(&key(x - self.origin, self.width)) else {
+        let key = key(x - self.origin, self.width);
+        let Ok(own) = self.keys.binary_search(&key) else {
             return 0.0;
         };
         let (mut missing, mut area) = (0.0, 0.0);
@@ -312,12 +332,30 @@ fn key(x: Vector, width: f64) -> [i64; 3] {
     (x / (BIN * width)).floor().to_array().map(|i| i as i64)
 }
 
-/// The bins about one of them, in order.
-fn near(key: [i64; 3], number: &HashMap<[i64; 3], usize>) -> Vec<usize> {
+/// The bins within reach of each bin, in order.
+fn near(keys: &[[i64; 3]]) -> Vec<Vec<usize>> {
     let reach = (REACH / BIN).ceil() as i64;
-    let range = || -reach..=reach;
-    let steps = range().flat_map(|i| range().flat_map(move |j| range().map(move |k| [i, j, k])));
-    let ball = steps.filter(|step| step.iter().map(|i| i * i).sum::<i64>() <= reach * reach);
-    let around = ball.filter_map(|step| number.get(&[0, 1, 2].map(|axis| key[axis] + step[axis])));
-    around.copied().collect()
+    let mut rows: HashMap<[i64; 2], Range<usize>> = HashMap::new();
+    for (number, &[i, j, _]) in keys.iter().enumerate() {
+        let row = rows.entry([i, j]).or_insert(number..number);
+        row.end = number + 1;
+    }
+    // Rows within reach, and how far along each of them.
+    let steps = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| [i, j]));
+    let steps = steps.filter_map(|[i, j]| {
+        let rest = reach * reach - i * i - j * j;
+        (rest >= 0).then(|| ([i, j], rest.isqrt()))
+    });
+    let steps: Vec<([i64; 2], i64)> = steps.collect();
+    let about = |&[i, j, k]: &[i64; 3]| -> Vec<usize> {
+        let around = steps.iter().filter_map(|&([di, dj], along)| {
+            let row = rows.get(&[i + di, j + dj])?.clone();
+            let own = &keys[row.clone()];
+            let first = own.partition_point(|key| key[2] < k - along);
+            let after = own.partition_point(|key| key[2] <= k + along);
+            Some(row.start + first..row.start + after)
+        });
+        around.flatten().collect()
+    };
+    keys.par_iter().map(about).collect()
 }

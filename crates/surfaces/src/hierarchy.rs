@@ -6,7 +6,9 @@ use crate::triangle::{Part, Triangle, offset};
 use crate::vector::Vector;
 
 /// Most triangles in a box of the lowest level.
-const LEAF: usize = 4;
+const LEAF: usize = 8;
+/// Bounds are less sharp by this part of themselves, which is more than their rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// Boxes around all triangles, around halves of them, halves of these, and so on.
 #[derive(Clone, Debug)]
@@ -14,6 +16,65 @@ pub(crate) struct Hierarchy {
     pub(crate) triangles: Vec<Triangle>,
     /// The two halves of box `i` are `2 i + 1` and `2 i + 2`; the last level is complete.
     boxes: Vec<BoundingBox<3>>,
+    /// The boxes of the last level.
+    leaves: Vec<Leaf>,
+}
+
+/// What bounds the squared distances of the triangles of a box from below, one in each lane.
+///
+/// A point of a triangle with the longest side `l` is no farther than `l / sqrt 3` from a corner, and the way from `x` to the nearest point of the
+/// triangle is perpendicular to that to such a corner: `|x - corner|^2 - l^2 / 3` is at most the squared distance. That is far quicker than the nearest
+/// point, and for distances that are large against the sides hardly less.
+#[derive(Clone, Debug)]
+struct Leaf {
+    /// Coordinates of the three corners, at infinity in lanes without a triangle.
+    corners: [[[f64; LEAF]; 3]; 3],
+    /// `l^2 / 3`.
+    room: [f64; LEAF],
+}
+
+impl Leaf {
+    fn new(triangles: &[Triangle]) -> Self {
+        let mut leaf = Self {
+            corners: [[[f64::INFINITY; LEAF]; 3]; 3],
+            room: [0.0; LEAF],
+        };
+        for (lane, [a, b, c]) in triangles.iter().enumerate() {
+            for (corner, x) in leaf.corners.iter_mut().zip([a, b, c]) {
+                for axis in 0..3 {
+                    corner[axis][lane] = x[axis];
+                }
+            }
+            let sides = [
+                a.distance_squared(*b),
+                b.distance_squared(*c),
+                c.distance_squared(*a),
+            ];
+            let longest = sides.into_iter().fold(0.0, f64::max);
+            leaf.room[lane] = (1.0 + ROUNDING) * longest / 3.0;
+        }
+        leaf
+    }
+
+    /// The lower bounds for the distances from `x`.
+    fn bounds(&self, x: Vector) -> [f64; LEAF] {
+        let mut least = [f64::INFINITY; LEAF];
+        for [xs, ys, zs] in &self.corners {
+            for lane in 0..LEAF {
+                let [dx, dy, dz] = [xs[lane] - x.x, ys[lane] - x.y, zs[lane] - x.z];
+                let squared = dx * dx + dy * dy + dz * dz;
+                least[lane] = if squared < least[lane] {
+                    squared
+                } else {
+                    least[lane]
+                };
+            }
+        }
+        for lane in 0..LEAF {
+            least[lane] = least[lane] * (1.0 - ROUNDING) - self.room[lane];
+        }
+        least
+    }
 }
 
 /// The point of the triangles that is nearest to another point.
@@ -34,8 +95,15 @@ impl Hierarchy {
         let mut boxes = vec![bounds(triangles.iter().take(1)); (2 << levels) - 1];
         let mut order: Vec<usize> = (0..triangles.len()).collect();
         divide(triangles, &mut order, &mut boxes, 0);
-        let triangles = order.iter().map(|&t| triangles[t]).collect();
-        (Self { triangles, boxes }, order)
+        let triangles: Vec<Triangle> = order.iter().map(|&t| triangles[t]).collect();
+        let mut leaves = Vec::with_capacity(1 << levels);
+        pack(&triangles, levels, &mut leaves);
+        let hierarchy = Self {
+            triangles,
+            boxes,
+            leaves,
+        };
+        (hierarchy, order)
     }
 
     pub(crate) fn project(&self, x: Vector, triangle: usize) -> Nearest {
@@ -68,7 +136,11 @@ impl Hierarchy {
         let bound = |best: &Option<Nearest>| best.map_or(f64::MAX, |b| b.squared_distance);
         let first = 2 * node + 1;
         if first >= self.boxes.len() {
-            for triangle in range {
+            let leaf = &self.leaves[node + 1 - self.leaves.len()];
+            for (triangle, least) in range.zip(leaf.bounds(x)) {
+                if least >= bound(best) {
+                    continue;
+                }
                 let candidate = self.project(x, triangle);
                 if candidate.squared_distance < bound(best) {
                     *best = Some(candidate);
@@ -77,15 +149,30 @@ impl Hierarchy {
             return;
         }
         let middle = range.start.midpoint(range.end);
-        let mut halves = [(first, range.start..middle), (first + 1, middle..range.end)]
-            .map(|(half, range)| (squared_distance(&self.boxes[half], x), half, range));
-        if halves[1].0 < halves[0].0 {
-            halves.swap(0, 1);
+        let (low, high) = (range.start..middle, middle..range.end);
+        let below = squared_distance(&self.boxes[first], x);
+        let above = squared_distance(&self.boxes[first + 1], x);
+        // No sorted array of all this: moving it about would take longer than the rest.
+        if below <= above {
+            self.search_within(x, below, first, low, best);
+            self.search_within(x, above, first + 1, high, best);
+        } else {
+            self.search_within(x, above, first + 1, high, best);
+            self.search_within(x, below, first, low, best);
         }
-        for (distance, half, range) in halves {
-            if distance < bound(best) {
-                self.search(x, half, range, best);
-            }
+    }
+
+    /// Searches a box at this squared distance, unless something nearer is known.
+    fn search_within(
+        &self,
+        x: Vector,
+        squared_distance: f64,
+        node: usize,
+        range: std::ops::Range<usize>,
+        best: &mut Option<Nearest>,
+    ) {
+        if squared_distance < best.map_or(f64::MAX, |b| b.squared_distance) {
+            self.search(x, node, range, best);
         }
     }
 }
@@ -118,4 +205,15 @@ fn divide(triangles: &[Triangle], order: &mut [usize], boxes: &mut [BoundingBox<
     let (low, high) = order.split_at_mut(middle);
     divide(triangles, low, boxes, 2 * node + 1);
     divide(triangles, high, boxes, 2 * node + 2);
+}
+
+/// The boxes of the last level, from their triangles in order.
+fn pack(triangles: &[Triangle], levels: u32, leaves: &mut Vec<Leaf>) {
+    if levels == 0 {
+        leaves.push(Leaf::new(triangles));
+        return;
+    }
+    let (low, high) = triangles.split_at(triangles.len() / 2);
+    pack(low, levels - 1, leaves);
+    pack(high, levels - 1, leaves);
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use chacha20::ChaCha8Rng;
 use geometry::measure::BoundingBox;
 use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
 
 use crate::Error;
 use crate::vector::{Vector, scaled_normal};
@@ -206,15 +207,21 @@ pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) 
 
 /// For every vertex the sum of the unit normals of its faces, weighted by their angles there.
 pub(crate) fn angle_weighted_normals(vertices: &[Vector], faces: &[[u32; 3]]) -> Vec<Vector> {
-    let mut normals = vec![Vector::ZERO; vertices.len()];
-    for face in faces {
+    let at_corners = |face: &[u32; 3]| {
         let triangle = face.map(|v| vertices[v as usize]);
         let normal = scaled_normal(triangle).normalize_or_zero();
-        for i in 0..3 {
+        [0, 1, 2].map(|i| {
             let [here, next, last] = [i, i + 1, i + 2].map(|i| triangle[i % 3]);
             let (a, b) = (next - here, last - here);
-            let angle = a.cross(b).length().atan2(a.dot(b));
-            normals[face[i] as usize] += normal * angle;
+            normal * a.cross(b).length().atan2(a.dot(b))
+        })
+    };
+    let weighted: Vec<_> = faces.par_iter().map(at_corners).collect();
+    // One after the other, so that sums do not depend on the threads.
+    let mut normals = vec![Vector::ZERO; vertices.len()];
+    for (face, at_corners) in faces.iter().zip(weighted) {
+        for (&vertex, normal) in face.iter().zip(at_corners) {
+            normals[vertex as usize] += normal;
         }
     }
     normals
