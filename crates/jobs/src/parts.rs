@@ -234,6 +234,9 @@ impl Matched {
 
     /// Finds out with which others the parts without a new part are one: those that are inside of the new surface where they were inside.
     fn join(&mut self) {
+        if (0..self.parts.count()).all(|part| self.owner.contains(&part)) {
+            return;
+        }
         let distance = MeshDistance::new(&self.made);
         let places = self.parts.centroids(self.before.mesh());
         let volumes = self.parts.volumes(self.before.mesh());
@@ -329,6 +332,9 @@ impl Matched {
 
 /// The part before to which most vertices of each new part are nearest.
 fn owners(before: &ClosedMesh, parts: &Parts, made: &ClosedMesh, new: &Parts) -> Vec<usize> {
+    if parts.count() == 1 {
+        return vec![0; new.count()];
+    }
     let nearest = MeshDistance::new(before).nearest_faces(&made.mesh().vertices);
     let mut votes = vec![vec![0; parts.count()]; new.count()];
     for (face, part) in nearest.into_iter().zip(new.of_vertices()) {
