@@ -144,7 +144,7 @@ fn every_part_keeps_its_own_volume() {
         "fair",
         "balls.nii.gz",
         "--cells",
-        "96",
+        "72",
         "--save",
         "balls.ply",
     ];
@@ -204,7 +204,7 @@ fn every_place_keeps_its_volume() {
     let volume = write(&folder.path().join("sac.nii.gz"), |x| {
         u8::from(vessel_with_sac(x))
     });
-    let options = ["--cells", "64", "--save", "sac.ply", "--output", "run"];
+    let options = ["--save", "sac.ply", "--output", "run"];
     let ended = outcome(
         folder.path(),
         &[&["fair", "sac.nii.gz"][..], &options].concat(),
@@ -252,8 +252,6 @@ fn details_below_a_length_go() {
     let height = |radii: f64| {
         let detail = format!("{}", radii * BUMP[0] * SIDE);
         let options = [
-            "--cells",
-            "64",
             "--no-page",
             "--force",
             "--output",

@@ -70,6 +70,7 @@ impl FairOptions {
                     willmore.volume.get_or_insert(SizeTarget::Keep);
                 }
                 reader.keeps_volumes = willmore.volume == Some(SizeTarget::Keep);
+                reader.hardly_moves = self.detail.is_some() || !ends;
                 let mut loaded = reader.load()?;
                 if let Loaded::Space(start) = &mut loaded
                     && let Some(voxels) = &mut start.presentation.voxels

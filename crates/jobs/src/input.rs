@@ -64,6 +64,26 @@ pub fn open(options: &mut InputOptions, eps_over_h: f64, watcher: &dyn Watcher) 
     })
 }
 
+/// The grids about a shape of which one is taken.
+struct Grids<'a> {
+    /// The part of the box that the shape takes.
+    part: f64,
+    /// Cells per unit length, in ascending order.
+    cells: &'a [usize],
+    /// The largest spacing, and the number of cells per unit length from which on a larger one will do.
+    spacing: Option<(f64, usize)>,
+}
+
+impl<'a> Grids<'a> {
+    fn usual(cells: &'a [usize]) -> Self {
+        Self {
+            part: PART,
+            cells,
+            spacing: None,
+        }
+    }
+}
+
 /// What an input is; the paths of files are absolute.
 #[derive(Clone)]
 pub enum Source {
@@ -90,6 +110,10 @@ const IMAGE_CELLS: [usize; 5] = [128, 192, 256, 384, 512];
 const MESH_CELLS: [usize; 3] = [64, 96, 128];
 /// and those for meshes whose components or holes these do not have.
 const FINER_CELLS: [usize; 2] = [160, 192];
+/// The same for segmentations of which only the staircase is taken off, all with fast Fourier transforms,
+const STAIRCASE_CELLS: [usize; 8] = [48, 56, 64, 72, 80, 96, 112, 128];
+/// of which the last two are for thin parts alone: staircases go on grids that are coarser than the voxels, too.
+const FINEST_FOR_VOXELS: usize = 96;
 /// Interface widths between a shape and the sides of the box, beyond which its periodic images are.
 const ROOM: f64 = 1.0;
 /// Parts and gaps of less than so many interface widths are thin.
@@ -266,6 +290,8 @@ pub struct Reader<'a> {
     pub allows_loss: Option<bool>,
     /// Whether the parts of a segmentation keep their volumes, and small ones do not flow.
     pub keeps_volumes: bool,
+    /// Whether only the staircase of a segmentation is taken off, so that there is no growth to leave room for.
+    pub hardly_moves: bool,
     /// The flow that will store the whole grid, if one will, and where: its memory is looked at before anything takes long.
     pub whole: Option<(DeviceKind, Flow)>,
     /// Whether the flow takes bricks near the surface where they are less than half of the grid, and what is elsewhere does not count.
@@ -301,6 +327,7 @@ impl<'a> Reader<'a> {
             source,
             allows_loss: None,
             keeps_volumes: false,
+            hardly_moves: false,
             whole: None,
             takes_bricks: false,
             chosen: options.cells,
@@ -370,12 +397,13 @@ impl<'a> Reader<'a> {
     }
 
     /// What comes of the number of cells that was chosen, or of the first of these with which all is well, as the attempt says, or of the last.
+    /// The room at the sides of the box is that for each number of cells.
     fn first_good<T>(
         &mut self,
         grids: &[usize],
         attempt: impl Fn(&mut Self) -> Result<(T, bool)>,
     ) -> Result<T> {
-        let chosen = self.chosen;
+        let (chosen, side_length) = (self.chosen, self.options.side_length);
         let grids = chosen.as_ref().map_or(grids, std::slice::from_ref);
         let (last, others) = grids.split_last().expect("there is a grid to try");
         for &cells in others {
@@ -383,21 +411,27 @@ impl<'a> Reader<'a> {
             if let (made, true) = attempt(self)? {
                 return Ok(made);
             }
+            self.options.side_length = side_length;
         }
         self.options.cells = Some(*last);
         Ok(attempt(self)?.0)
     }
 
-    /// The coarsest of some grids about a shape that holds its thin parts and gaps, or the one that was chosen.
+    /// The coarsest of some grids about a shape that is fine enough and holds its thin parts and gaps, or the one that was chosen.
     fn grid_holding<const D: usize>(
         &mut self,
         bounds: &BoundingBox<D>,
-        grids: &[usize],
+        grids: &Grids,
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>> {
-        let (grid, thin) = self.first_good(grids, |reader| {
-            let grid = reader.grid_around(bounds, PART)?;
+        let (grid, thin) = self.first_good(grids.cells, |reader| {
+            let grid = reader.grid_around(bounds, grids.part)?;
+            let is_coarse = (grids.spacing)
+                .is_some_and(|(most, cells)| grid.spacing() > most && reader.cells() < cells);
+            if is_coarse && reader.chosen.is_none() {
+                return Ok(((grid, 1.0), false));
+            }
             let thin = thin_part(shape, sides.clone(), reader.thin_below(&grid));
             Ok(((grid, thin), thin < THIN_PART))
         })?;
@@ -502,7 +536,8 @@ impl<'a> Reader<'a> {
     fn mesh(&mut self, mesh: &ClosedMesh, up: UpAxis) -> Result<Loaded> {
         let sides = mesh.mesh().sides(MOST_RAYS);
         let distance = MeshDistance::new(mesh);
-        self.grid_holding(&mesh.bounding_box(), &MESH_CELLS, &distance, &sides)?;
+        let usual = Grids::usual(&MESH_CELLS);
+        self.grid_holding(&mesh.bounding_box(), &usual, &distance, &sides)?;
         let coarsest = self.cells();
         let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
         let grids: Vec<usize> = grids.filter(|&cells| cells >= coarsest).collect();
@@ -641,8 +676,9 @@ impl<'a> Reader<'a> {
         }
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
         let distance = outline.distance();
+        let grids = Grids::usual(&IMAGE_CELLS);
         let sides = outline.sides();
-        let grid = self.grid_holding(&image.bounding_box(), &IMAGE_CELLS, &distance, &sides)?;
+        let grid = self.grid_holding(&image.bounding_box(), &grids, &distance, &sides)?;
         let field = stored_phase_field(grid, &distance, self.eps(&grid))?;
         Ok(Loaded::Plane(self.start(field, plane)?))
     }
@@ -652,12 +688,8 @@ impl<'a> Reader<'a> {
         let bounds = body.surface.bounding_box();
         let distance = MeshDistance::new(&body.surface);
         let sides = body.surface.mesh().sides(MOST_RAYS);
-        // As fine as the voxels, where that is possible.
-        let fine = bounds.longest_side() / (PART * body.voxel);
-        let last = MESH_CELLS.len() - 1;
-        let first = MESH_CELLS.iter().position(|&cells| cells as f64 >= fine);
-        let grids = &MESH_CELLS[first.unwrap_or(last)..];
-        let grid = self.grid_holding(&bounds, grids, &distance, &sides)?;
+        let grids = self.grids_for(body.voxel);
+        let grid = self.grid_holding(&bounds, &grids, &distance, &sides)?;
         let wide = grid.spacing() / body.voxel;
         if wide > 1.5 {
             self.watcher.note(&Note::CoarserThanVoxels {
@@ -689,6 +721,23 @@ impl<'a> Reader<'a> {
             ..Space::default()
         };
         Ok(Loaded::Space(self.start(field, space)?))
+    }
+
+    /// As fine as the voxels, where that is possible.
+    fn grids_for(&self, voxel: f64) -> Grids<'static> {
+        if self.hardly_moves {
+            Grids {
+                part: OWN_PART[0],
+                cells: &STAIRCASE_CELLS,
+                spacing: Some((voxel, FINEST_FOR_VOXELS)),
+            }
+        } else {
+            let finest = MESH_CELLS[MESH_CELLS.len() - 1];
+            Grids {
+                spacing: Some((voxel, finest)),
+                ..Grids::usual(&MESH_CELLS)
+            }
+        }
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Stored<3>> {

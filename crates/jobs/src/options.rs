@@ -43,7 +43,8 @@ pub struct InputOptions {
     /// Longest side of the shape in the box, in the same unit as `box_side` [default: 0.6 of the side of the box]
     ///
     /// A mesh, an image or a volume is scaled to this size in the box. Other options take lengths in the units of the input, except for `box_side`.
-    /// For `fair` of a mesh, the default is 0.9 of the side of the box if noise is taken off, and 0.8 if not.
+    /// For `fair` of a mesh, the default is 0.9 of the side of the box if noise is taken off, and 0.8 if not. For `fair` of a segmentation, it is 0.9
+    /// if details are taken off. On coarse grids it is less, so that three interface widths stay free at each side.
     #[arg(long, value_name = "LENGTH", help_heading = GRID, hide_short_help = true)]
     pub side_length: Option<f64>,
 
