@@ -250,6 +250,20 @@ impl<'a, const D: usize> Restoring<'a, D> {
         Ok(None)
     }
 
+    /// What the constraints add to the gradient of the energy at a phase field, with these multipliers.
+    pub(crate) fn pull(&self, u: &Tensor<D>, multipliers: [f64; 2]) -> Result<Vec<f64>, Error> {
+        let Some(tangent) = self.tangent(u)? else {
+            return Err(Error::non_finite(0, "phase field"));
+        };
+        let mut pull = vec![0.0; tangent.u.len()];
+        for (part, gradient) in tangent.parts.iter().zip(self.gradients(&tangent)) {
+            for (pull, slope) in pull.iter_mut().zip(gradient) {
+                *pull += multipliers[part.measure] * slope;
+            }
+        }
+        Ok(pull)
+    }
+
     /// The error where nothing near `u` fulfils the constraints.
     pub(crate) fn lost(&self, u: &Tensor<D>) -> Result<Error, Error> {
         let parts = self

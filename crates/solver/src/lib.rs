@@ -50,6 +50,7 @@
 
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 
+mod bounds;
 mod bricks;
 mod cg;
 mod constraints;
@@ -78,6 +79,7 @@ mod state;
 mod stepper;
 mod times;
 
+pub use bounds::Bounds;
 pub use bricks::REACH as BRICK_REACH;
 pub use constraints::Constraints;
 pub use displacement::widths_between;

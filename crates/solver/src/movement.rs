@@ -5,15 +5,20 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use geometry::{NodeSet, Nodes};
 
+use crate::bounds::{Active, BoundsOn};
 use crate::constraints::{Constraints, Restoring};
 use crate::newton::{NewtonInfo, Restrictions, minimize_timed};
 use crate::preconditioner::Preconditioner;
 use crate::region::Region;
 use crate::times::PhaseTimes;
 use crate::{
-    Accuracy, DeviceField, Domain, EnergyTerms, Error, Exit, FlowParams, MeanCurvatureStep,
-    MinimizingMovement, MovementGraph, PhaseInverse, PhaseInverses, Problem, State, bricks,
+    Accuracy, Bounds, DeviceField, Domain, EnergyTerms, Error, Exit, FlowParams, MeanCurvatureStep,
+    MinimizingMovement, MovementGraph, Objective, PhaseInverse, PhaseInverses, Problem, State,
+    bricks,
 };
+
+/// Rounds in which nodes go to their bounds and from them.
+const ROUNDS: usize = 12;
 
 /// One minimization, of `1/2 |s (u - a)|^2` and the weighted energy.
 #[derive(Clone, Debug)]
@@ -88,6 +93,8 @@ struct Prepared<const D: usize> {
     nodes_that_move: Option<Arc<NodeSet>>,
     step: Arc<dyn MeanCurvatureStep<D>>,
     region: Option<Region<D>>,
+    bounds_of: Option<Arc<Bounds<D>>>,
+    bounds: Option<Arc<BoundsOn>>,
     domain: Domain<D>,
     /// The energy, and the one with factors of the motion, each traced when it is first minimized.
     energies: [Option<MinimizingMovement<D>>; 2],
@@ -156,31 +163,30 @@ impl<const D: usize> Minimizations<D> {
         let prepared = self.prepared(problem, movement.anchor.nodes())?;
         let stiffness = params.stiffness(movement.tau);
         let phase = prepared.fit(problem, stiffness);
-        let preconditioner = Preconditioner {
-            phase,
-            nodes: prepared.nodes.clone(),
-            eps: params.eps,
-            tau: movement.tau,
-            stiffness,
-            region: prepared.region.clone(),
-            interface: None,
-        };
+        let nodes = prepared.nodes.clone();
         let inner = prepared.step.clone();
+        let bounds = prepared.bounds.clone();
         let (energy, region) = prepared.energy(movement, stiffness)?;
-        let mut held = Restoring::new(&movement.targets, current, params.eps, region);
-        let minimized = minimize_timed(
+        let mut minimizing = Minimizing {
             energy,
-            Restrictions {
-                region,
-                held: held.as_mut(),
-            },
-            current.values(),
-            movement.start.values(),
-            Some(preconditioner),
-            params.newton,
-            device,
-        );
-        let (u, newton, times) = minimized.map_err(|error| error.at(step))?;
+            region,
+            phase,
+            nodes,
+            stiffness,
+            params,
+            current,
+            movement,
+        };
+        let found = match bounds {
+            Some(bounds) => minimizing.within(bounds),
+            None => minimizing.run(region, None, movement.start.values()),
+        };
+        let Found {
+            u,
+            newton,
+            times,
+            multipliers,
+        } = found.map_err(|error| error.at(step))?;
         if newton.exit == Exit::IterationLimit {
             return Err(Error::NotConverged {
                 step,
@@ -194,7 +200,7 @@ impl<const D: usize> Minimizations<D> {
         let fidelity = movement.fidelity(&*inner, &u)?;
         // The energy of standing still is 2 tau w.
         let unit = problem.energy_scale() / (2.0 * movement.tau);
-        let multipliers = held.map(|held| held.multipliers.map(|value| unit * value));
+        let multipliers = multipliers.map(|values| values.map(|value| unit * value));
         let [tension, pressure] = multipliers.unwrap_or_default();
         let targets = movement.targets;
         Ok(Minimum {
@@ -206,6 +212,114 @@ impl<const D: usize> Minimizations<D> {
             newton,
             times,
         })
+    }
+}
+
+/// A minimization that may be made several times, with other nodes held.
+struct Minimizing<'a, const D: usize> {
+    energy: &'a mut MinimizingMovement<D>,
+    region: Option<&'a Region<D>>,
+    phase: PhaseInverse<D>,
+    nodes: Nodes<D>,
+    stiffness: f64,
+    params: &'a FlowParams,
+    current: &'a DeviceField<D>,
+    movement: &'a Movement<D>,
+}
+
+/// What it ends in.
+struct Found<const D: usize> {
+    u: Tensor<D>,
+    newton: NewtonInfo,
+    times: PhaseTimes,
+    multipliers: Option<[f64; 2]>,
+}
+
+impl<const D: usize> Minimizing<'_, D> {
+    /// In a region, with fixed values elsewhere, or those of the current phase field.
+    fn run(
+        &mut self,
+        region: Option<&Region<D>>,
+        fixed: Option<&Tensor<D>>,
+        start: &Tensor<D>,
+    ) -> Result<Found<D>, Error> {
+        let (current, params) = (self.current, self.params);
+        let preconditioner = Preconditioner {
+            phase: self.phase.clone(),
+            nodes: self.nodes.clone(),
+            eps: params.eps,
+            tau: self.movement.tau,
+            stiffness: self.stiffness,
+            region: region.cloned(),
+            interface: None,
+        };
+        let mut held = Restoring::new(&self.movement.targets, current, params.eps, region);
+        let (u, newton, times) = minimize_timed(
+            self.energy,
+            Restrictions {
+                region,
+                fixed,
+                held: held.as_mut(),
+            },
+            current.values(),
+            start,
+            Some(preconditioner),
+            params.newton,
+            current.device(),
+        )?;
+        Ok(Found {
+            u,
+            newton,
+            times,
+            multipliers: held.map(|held| held.multipliers),
+        })
+    }
+
+    /// Under bounds.
+    fn within(&mut self, bounds: Arc<BoundsOn>) -> Result<Found<D>, Error> {
+        let (device, shape) = (self.current.device(), self.current.values().dims());
+        let base = self.region;
+        let mut found = self.run(base, None, self.movement.start.values())?;
+        let mut active = Active::none(bounds);
+        for _ in 0..ROUNDS {
+            let values = device.values(found.u.clone())?;
+            let gradient = if active.is_empty() {
+                None
+            } else {
+                Some(self.gradient(&found)?)
+            };
+            if !active.update(&values, gradient.as_deref()) {
+                return Ok(found);
+            }
+            let region = active.region(base, shape, device);
+            let clamped = active.clamped(&values, shape, device);
+            let fixed = Region::hold(base, clamped, self.current.values());
+            let next = self.run(Some(&region), Some(&fixed), &fixed)?;
+            found = Found {
+                newton: next.newton.after(&found.newton),
+                times: found.times + next.times,
+                ..next
+            };
+        }
+        // Few nodes are left, which are beyond their bounds by little.
+        let values = device.values(found.u)?;
+        let clamped = active.clamped(&values, shape, device);
+        found.u = Region::hold(base, clamped, self.current.values());
+        Ok(found)
+    }
+
+    /// The gradient of the energy with what is held, also at nodes that are.
+    fn gradient(&mut self, found: &Found<D>) -> Result<Vec<f64>, Error> {
+        let (_, gradient) = self.energy.evaluate(&found.u)?;
+        let mut gradient = self.current.device().values(gradient)?;
+        let targets = &self.movement.targets;
+        let held = Restoring::new(targets, self.current, self.params.eps, None);
+        if let (Some(held), Some(multipliers)) = (held, found.multipliers) {
+            for (slope, pull) in gradient.iter_mut().zip(held.pull(&found.u, multipliers)?) {
+                *slope += pull;
+            }
+        }
+        Ok(gradient)
     }
 }
 
@@ -224,6 +338,8 @@ impl<const D: usize> Prepared<D> {
             nodes_that_move: problem.region.clone(),
             step,
             region,
+            bounds: problem.bounds.as_ref().map(|bounds| bounds.on(nodes)),
+            bounds_of: problem.bounds.clone(),
             domain: problem.domain(nodes),
             energies: [None, None],
             inverses: inverses.map_err(Error::Operator)?,
@@ -233,16 +349,15 @@ impl<const D: usize> Prepared<D> {
 
     /// Whether it is what such a minimization needs.
     fn serves(&self, problem: &Problem<D>, nodes: &Nodes<D>) -> bool {
-        let same_region = match (&self.nodes_that_move, &problem.region) {
-            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
-            (own, other) => own.is_none() && other.is_none(),
-        };
+        let same_region = are_same(self.nodes_that_move.as_ref(), problem.region.as_ref());
+        let same_bounds = are_same(self.bounds_of.as_ref(), problem.bounds.as_ref());
         let terms = self.terms.iter().zip(&problem.terms);
         let same_terms = self.terms.len() == problem.terms.len()
             && terms
                 .into_iter()
                 .all(|(own, other)| Arc::ptr_eq(own, other));
         same_region
+            && same_bounds
             && self.params == problem.params
             && Arc::ptr_eq(&self.operator, &problem.operator)
             && self.response == problem.response.to_bits()
@@ -297,5 +412,13 @@ impl<const D: usize> Prepared<D> {
         }
         energy.set(anchor, stiffness)?;
         Ok((energy, self.region.as_ref()))
+    }
+}
+
+/// Whether both are one, or neither is there.
+fn are_same<T>(own: Option<&Arc<T>>, other: Option<&Arc<T>>) -> bool {
+    match (own, other) {
+        (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+        (own, other) => own.is_none() && other.is_none(),
     }
 }

@@ -81,8 +81,9 @@ type End<const D: usize> = (Exit, (Tensor<D>, f64));
 
 struct Minimizer<'a, 'h, const D: usize, O> {
     objective: &'a mut O,
-    /// Outside of it, values stay as they were.
     region: Option<&'a Region<D>>,
+    /// The values outside of it.
+    fixed: &'a Tensor<D>,
     held: Option<&'a mut Restoring<'h, D>>,
     params: NewtonParams,
     device: &'a ComputeDevice,
@@ -122,6 +123,8 @@ pub fn minimize<const D: usize>(
 pub(crate) struct Restrictions<'a, 'b, const D: usize> {
     /// Where values change; everywhere if there is none.
     pub region: Option<&'a Region<D>>,
+    /// The values elsewhere, if they are not those from before the step.
+    pub fixed: Option<&'a Tensor<D>>,
     /// What brings perimeter and volume back to their targets.
     pub held: Option<&'a mut Restoring<'b, D>>,
 }
@@ -129,7 +132,11 @@ pub(crate) struct Restrictions<'a, 'b, const D: usize> {
 /// [`minimize`] under constraints, with a preconditioner and the time of its parts.
 pub(crate) fn minimize_timed<const D: usize>(
     objective: &mut impl Objective<D>,
-    Restrictions { region, held }: Restrictions<'_, '_, D>,
+    Restrictions {
+        region,
+        fixed,
+        held,
+    }: Restrictions<'_, '_, D>,
     previous: &Tensor<D>,
     start: &Tensor<D>,
     preconditioner: Option<Preconditioner<D>>,
@@ -145,6 +152,7 @@ pub(crate) fn minimize_timed<const D: usize>(
     let mut minimizer = Minimizer {
         objective,
         region,
+        fixed: fixed.unwrap_or(previous),
         held,
         params,
         device,
@@ -174,7 +182,7 @@ pub(crate) fn minimize_timed<const D: usize>(
 impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     /// `u` with the values that may not change put back, where there are such.
     fn keep_outside(&self, u: Tensor<D>) -> Tensor<D> {
-        Region::hold(self.region, u, self.previous)
+        Region::hold(self.region, u, self.fixed)
     }
 
     /// The phase field near `u` at which the energy counts; none if nothing near it fulfils the constraints.
@@ -187,7 +195,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// The same, exactly if so said, and where there is none, the error that says so.
     fn found(&self, u: &Tensor<D>, exactly: bool) -> Result<Place<D>, Error> {
-        let (u, tangent) = (u.clone(), None);
+        let (u, tangent) = (self.keep_outside(u.clone()), None);
         let Some(held) = &self.held else {
             return Ok(Place { u, tangent });
         };

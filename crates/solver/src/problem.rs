@@ -8,8 +8,8 @@ use operators::ComputeDevice;
 
 use crate::energy::check;
 use crate::{
-    DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held, MeanCurvatureStep,
-    State, StepScales, TermCheck, bricks,
+    Bounds, DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held,
+    MeanCurvatureStep, State, StepScales, TermCheck, bricks,
 };
 
 /// The side of the smallest bricks.
@@ -30,6 +30,8 @@ pub struct Problem<const D: usize> {
     pub response: f64,
     /// The nodes whose values move, if not all; see [`Self::restrict_to`].
     pub region: Option<Arc<NodeSet>>,
+    /// How far the interface may go, if there is a bound; see [`Self::keep_within`].
+    pub bounds: Option<Arc<Bounds<D>>>,
     /// The sizes that are held.
     pub held: Held,
     /// The problem on the grid of half as many cells, where steps begin, if they do; see [`Self::begin_on`]. States on bricks do not look at it.
@@ -72,6 +74,7 @@ impl<const D: usize> Problem<D> {
             terms: Vec::new(),
             response: 1.0,
             region: None,
+            bounds: None,
             held: Held::default(),
             half: None,
             device: device.clone(),
@@ -143,6 +146,20 @@ impl<const D: usize> Problem<D> {
                 self.half = Some(Arc::new(half));
             }
         }
+        Ok(())
+    }
+
+    /// Keeps the interface within a distance of that of a phase field: every minimization is one under [bounds](Bounds) on the values near it. Nodes that go
+    /// beyond a bound are held there, and go free again where the energy pulls them back, until there are none of either (a primal-dual active set:
+    /// M. Hintermüller, K. Ito, K. Kunisch: The primal-dual active set strategy as a semismooth Newton method. SIAM J. Optim. 13, 2003). A minimization begins
+    /// without them, also on the half grid. Mean curvature flow has no such bounds.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for another grid, and as [`Bounds::within`].
+    pub fn keep_within(&mut self, distance: f64, of: &Stored<D>) -> Result<(), Error> {
+        self.grid.same_as(of.nodes().grid())?;
+        let bounds = Bounds::within(distance, of, self.params.eps)?;
+        self.bounds = Some(Arc::new(bounds));
         Ok(())
     }
 

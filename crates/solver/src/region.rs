@@ -31,7 +31,7 @@ impl<const D: usize> Region<D> {
         }
     }
 
-    fn marked(marks: Arc<[bool]>, shape: [usize; D], device: &ComputeDevice) -> Self {
+    pub(crate) fn marked(marks: Arc<[bool]>, shape: [usize; D], device: &ComputeDevice) -> Self {
         let values: Vec<f64> = marks.iter().map(|&inside| f64::from(inside)).collect();
         let inside = device.tensor::<D>(&values, shape);
         Self {

@@ -1,5 +1,6 @@
 //! Minimizations, flows and their parts.
 
+mod bounds;
 mod bricks;
 mod calibration;
 mod common;
