@@ -20,6 +20,7 @@ def fair(
     mesh: Any,
     *,
     noise: float | None = None,
+    max_distance: float | None = None,
     fixed: Any = None,
     volume: Any = "keep",
     area: Any = None,
@@ -44,6 +45,8 @@ def fair(
         ``(vertices, faces)``, a mesh of trimesh, pyvista or meshio, or the name of a file. It must be closed, or see `repair`.
     noise : float, optional
         Standard deviation of the noise along the normals, in the units of the mesh. By default it is estimated.
+    max_distance : float, optional
+        Largest distance of the vertices from the mesh that came in, in its units. By default there is no such bound.
     fixed : (n,) array of bool, or str, optional
         The vertices that stay, or a region: ``"box:x0,y0,z0,x1,y1,z1"``, ``"ball:x,y,z,r"``, or the file of a closed mesh.
     volume : "keep", float, "90%" or None
@@ -97,6 +100,7 @@ def fair(
         volume = None
     options = {
         "noise": noise,
+        "max_distance": max_distance,
         "keep": region,
         "volume": volume,
         "area": area,
@@ -123,6 +127,7 @@ def surfaces(
     spacing: Any = None,
     origin: Any = None,
     detail: float | None = None,
+    max_distance: float | None = None,
     volume: Any = "keep",
     cells: int | None = None,
     progress: Progress = False,
@@ -145,6 +150,8 @@ def surfaces(
         Sides of a voxel and the centre of the first one, in place of `affine`; by default 1 and 0.
     detail : float, optional
         Details with a smaller radius are smoothed away. By default it is two voxels.
+    max_distance : float, optional
+        Largest distance of the vertices from the surface between the voxels. By default it is half a voxel. It wins over `detail`.
     volume : "keep", float, "90%" or None
         The volume of the voxels stays, also that of each part, goes to a value or to a part of it, or is left alone (None).
     cells : int, optional
@@ -173,7 +180,7 @@ def surfaces(
     >>> bool(abs(ball.report["volume"] / (8 * 1472) - 1) < 0.02)
     True
     """
-    options = {"detail": detail, "volume": volume, "cells": cells, **more}
+    options = {"detail": detail, "max_distance": max_distance, "volume": volume, "cells": cells, **more}
     name = _meshes.of_path(labels)
     voxels = None if name is not None else _inputs.of_voxels(labels, affine=affine, spacing=spacing, origin=origin)
     if voxels is None and not (affine is None and spacing is None and origin is None):

@@ -233,22 +233,29 @@ fn every_place_keeps_its_volume() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
 }
 
-/// A bump on a ball goes if its radius is half the length, and stays if it is twice the length.
-#[test]
-fn details_below_a_length_go() {
-    const BUMP: [f64; 2] = [2.5, 3.0];
-    let folder = tempfile::tempdir().unwrap();
-    let centre = [18.4, 18.4, 17.4];
-    write(&folder.path().join("bump.nii"), |x| {
-        let off = [0, 1, 2].map(|i| x[i] - centre[i]);
+/// The centre of a ball with a radius of 13, and the radius at which its bump has half of its height, and this height, in voxels.
+const BUMPY: [f64; 3] = [18.4, 18.4, 17.4];
+const BUMP: [f64; 2] = [2.5, 3.0];
+
+/// Writes a ball with a bump as the file `bump.nii`.
+fn write_bump(folder: &Path) {
+    write(&folder.join("bump.nii"), |x| {
+        let off = [0, 1, 2].map(|i| x[i] - BUMPY[i]);
         let across = off[0].hypot(off[1]) / BUMP[0];
         let bump = if off[2] > 0.0 {
             BUMP[1] * 0.5_f64.powf(across * across)
         } else {
             0.0
         };
-        u8::from(ball(x, centre, 13.0 + bump))
+        u8::from(ball(x, BUMPY, 13.0 + bump))
     });
+}
+
+/// A bump on a ball goes if its radius is half the length, and stays if it is twice the length.
+#[test]
+fn details_below_a_length_go() {
+    let folder = tempfile::tempdir().unwrap();
+    write_bump(folder.path());
     let height = |radii: f64| {
         let detail = format!("{}", radii * BUMP[0] * SIDE);
         let options = [
@@ -259,11 +266,19 @@ fn details_below_a_length_go() {
             "--save",
             "out.ply",
         ];
-        let fair = ["fair", "bump.nii", "--detail", &detail];
+        // With the usual bound the bump would stay.
+        let fair = [
+            "fair",
+            "bump.nii",
+            "--detail",
+            &detail,
+            "--max-distance",
+            "3",
+        ];
         outcome(folder.path(), &[&fair[..], &options].concat());
         let mesh = closed(&folder.path().join("out.ply"));
         let distances = mesh.mesh().vertices.iter().map(|x| {
-            let off = (0..3).map(|i| ((x[i] - ORIGIN[i]) / SIDE - centre[i]).powi(2));
+            let off = (0..3).map(|i| ((x[i] - ORIGIN[i]) / SIDE - BUMPY[i]).powi(2));
             off.sum::<f64>().sqrt()
         });
         distances.fold(0.0, f64::max) - 13.0
@@ -280,11 +295,107 @@ fn details_below_a_length_go() {
             "--detail has no meaning for an input that is no segmentation",
         ),
         (["fair", "bump.nii", "--detail", "-1"], "--detail"),
+        (
+            ["fair", "builtin:torus", "--max-distance", "0.1"],
+            "--max-distance has no meaning for an input that is neither a mesh nor a segmentation",
+        ),
+        (
+            ["fair", "bump.nii", "--max-distance", "0"],
+            "--max-distance",
+        ),
     ] {
         let output = program(folder.path()).args(arguments).output().unwrap();
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(error.contains(part), "{error}");
+    }
+}
+
+/// The largest distance of the vertices of one mesh from the faces of another one.
+fn farthest(mesh: &ClosedMesh, from: &ClosedMesh) -> f64 {
+    let distances = surfaces::MeshDistance::new(from).signed_distances(&mesh.mesh().vertices);
+    distances.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+/// No vertex is farther from the surface of the input than the bound, which wins over the strength of smoothing, and the volume stays.
+#[test]
+fn vertices_stay_within_a_distance() {
+    const TOLERANCE: f64 = 1.0 + 1e-6;
+    let folder = tempfile::tempdir().unwrap();
+    write_bump(folder.path());
+    let options = [
+        "--no-page",
+        "--force",
+        "--output",
+        "run",
+        "--save",
+        "out.ply",
+    ];
+    let detail = format!("{}", 2.0 * BUMP[0] * SIDE);
+    for (given, bound) in [(&[][..], 0.5 * SIDE), (&["--max-distance", "0.1"], 0.1)] {
+        let fair = [&["fair", "bump.nii", "--detail", &detail][..], given];
+        let ended = outcome(folder.path(), &[&fair.concat()[..], &options].concat());
+        let made = closed(&folder.path().join("out.ply"));
+        let voxels = closed(&folder.path().join("run/voxels.ply"));
+        let far = farthest(&made, &voxels);
+        assert!(
+            far <= bound * TOLERANCE && far > 0.999 * bound,
+            "{far} {bound}"
+        );
+        let mesh = &ended["mesh"];
+        assert!(
+            (number(mesh, "max_distance") - bound).abs() < 1e-7,
+            "{mesh}"
+        );
+        let percent = number(mesh, "vertices_at_max_distance_percent");
+        assert!(percent > 0.2 && percent < 50.0, "{mesh}");
+        let count = number(mesh, "vertices_at_max_distance") / made.mesh().vertices.len() as f64;
+        assert!((100.0 * count - percent).abs() < 1e-9, "{mesh}");
+        assert!(
+            (made.volume() / voxels.volume() - 1.0).abs() < 1e-6,
+            "{mesh}"
+        );
+        // The flow has kept the bump down to its top: a surface near to what is left of the input would not be enough.
+        let missing = farthest(&voxels, &made);
+        assert!(missing < bound + 0.25 * SIDE, "{missing} {bound}");
+    }
+    // A mesh, whose vertices follow and which becomes a new one.
+    let noisy = [
+        "sample",
+        "builtin:sphere",
+        "--cells",
+        "32",
+        "--noise",
+        "0.01",
+        "--save",
+    ];
+    assert!(
+        run(folder.path(), &[&noisy[..], &["noisy.ply"]].concat())
+            .status
+            .success()
+    );
+    let input = closed(&folder.path().join("noisy.ply"));
+    for remesh in [&[][..], &["--remesh"]] {
+        let fair = [
+            "fair",
+            "noisy.ply",
+            "--cells",
+            "48",
+            "--max-distance",
+            "0.004",
+        ];
+        let ended = outcome(folder.path(), &[&fair[..], remesh, &options].concat());
+        let made = closed(&folder.path().join("out.ply"));
+        let far = farthest(&made, &input);
+        assert!(far <= 0.004 * TOLERANCE && far > 0.0039, "{far}");
+        assert!(
+            number(&ended["mesh"], "vertices_at_max_distance") > 1.0,
+            "{ended}"
+        );
+        assert!(
+            (made.volume() / input.volume() - 1.0).abs() < 1e-6,
+            "{ended}"
+        );
     }
 }
 

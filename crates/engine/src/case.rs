@@ -24,6 +24,8 @@ pub struct Case<const D: usize> {
     pub initial: Stored<D>,
     /// The nodes whose values may move, if not all.
     pub region: Option<NodeSet>,
+    /// How far from that of the initial phase field the interface may go, if there is a bound; mean curvature flow has none.
+    pub max_distance: Option<f64>,
     /// Spontaneous curvature, tension and pressure in the energy; mean curvature flow has none.
     pub energy: Helfrich,
     /// The sizes that are held; mean curvature flow holds none.
@@ -58,6 +60,7 @@ impl<const D: usize> Case<D> {
             shape: shape.to_owned(),
             initial: initial.into(),
             region: None,
+            max_distance: None,
             energy: Helfrich::default(),
             held: Held::default(),
             flow: Flow::Willmore,
@@ -164,6 +167,9 @@ impl<const D: usize> Case<D> {
         if !self.energy.is_willmore() {
             identity["energy"] = json!(self.energy);
             identity["response"] = json!(self.operator.response);
+        }
+        if let Some(distance) = self.max_distance {
+            identity["max_distance"] = json!(distance);
         }
         if !self.held.is_empty() {
             identity["held"] = json!(self.held);

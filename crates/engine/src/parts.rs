@@ -123,6 +123,9 @@ fn willmore<const D: usize>(
     if let Some(region) = &case.region {
         problem.restrict_to(region)?;
     }
+    if let Some(distance) = case.max_distance {
+        problem.keep_within(distance, &case.initial)?;
+    }
     // What no shape has is refused before the first step: the targets, and sizes on the way to them.
     problem.hold(case.held)?;
     Ok(case.held.check(case.grid())?)

@@ -208,6 +208,7 @@ impl Job {
             shape: start.name,
             initial: start.initial,
             region: start.region,
+            max_distance: known.max_distance,
             energy,
             held,
             flow,

@@ -5,7 +5,7 @@ use crate::input::{Loaded, Source, closed};
 use crate::keep;
 use crate::options::{FairOptions, WillmoreOptions};
 use crate::own::OwnMesh;
-use crate::parts::DETAIL;
+use crate::parts::{DETAIL, MAX_DISTANCE};
 use crate::paths::absolute;
 use crate::prelude::*;
 use crate::values::SizeTarget;
@@ -56,6 +56,11 @@ impl FairOptions {
             let what = "an input that is no segmentation";
             return Err(Error::foreign("detail", "", what));
         }
+        let is_bounded = matches!(reader.source, Source::Volume(_) | Source::Mesh(_));
+        if self.max_distance.is_some() && !is_bounded {
+            let what = "an input that is neither a mesh nor a segmentation";
+            return Err(Error::foreign("max_distance", "", what));
+        }
         let loaded = match reader.source.clone() {
             Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
             Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
@@ -79,6 +84,8 @@ impl FairOptions {
                     let detail = self.detail.or((!ends).then_some(usual));
                     voxels.time = detail.map(|detail| (TIME_OF_DETAIL * detail).powi(4));
                     voxels.detail = detail.unwrap_or(usual);
+                    let usual = detail.map(|_| MAX_DISTANCE * voxels.side);
+                    voxels.max_distance = self.max_distance.or(usual);
                     if !ends && self.detail.is_none() {
                         voxels.farthest = Some(FARTHEST * voxels.side);
                     }
@@ -123,6 +130,7 @@ impl FairOptions {
         } = self.willmore;
         let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
         own.is_new = self.remesh;
+        own.max_distance = self.max_distance;
         own.check_movable(path)?;
         own.keeps_volume = volume == Some(SizeTarget::Keep);
         own.drives_volume = matches!(volume, Some(SizeTarget::To(_))) || reduced_volume.is_some();

@@ -12,6 +12,8 @@ const PIXELS: u32 = 640;
 /// Bars of the histogram, and their width in the figure.
 const BARS: usize = 40;
 const WIDTH: f64 = 8.0;
+/// Vertices nearer to a bound than this part of it are at the bound.
+const AT_BOUND: f64 = 1e-6;
 /// The colour of what the grid does not hold, which is none of viridis.
 const LOST: Rgb = OKABE_ITO[1];
 
@@ -85,6 +87,15 @@ pub struct MeshReport {
     /// The part of the vertices that could not follow the flow, in percent; none for a new mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_behind_percent: Option<f64>,
+    /// The largest distance from the old surface that was allowed, in the units of the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_distance: Option<f64>,
+    /// How many vertices are at this distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertices_at_max_distance: Option<usize>,
+    /// Their part of all vertices, in percent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertices_at_max_distance_percent: Option<f64>,
     /// The parts of a segmentation whose parts keep their volumes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartReport>,
@@ -114,6 +125,18 @@ impl MeshReport {
             report.area_change_percent = relative(after.area(), before.area());
         }
         report
+    }
+
+    /// Tells of vertices that are that far from the surface before how many are at a bound.
+    pub fn bound(&mut self, length: f64, lengths: &[f64]) {
+        let at = lengths
+            .iter()
+            .filter(|far| **far >= (1.0 - AT_BOUND) * length);
+        let at = at.count();
+        self.max_distance = Some(length);
+        self.vertices_at_max_distance = Some(at);
+        let all = lengths.len().max(1) as f64;
+        self.vertices_at_max_distance_percent = Some(100.0 * at as f64 / all);
     }
 }
 

@@ -436,6 +436,14 @@ pub struct FairOptions {
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub detail: Option<f64>,
 
+    /// Largest distance of the vertices from the surface of the input, in its units [default: half a voxel, none for a mesh]
+    ///
+    /// The surface of a segmentation is the one between its voxels. The bound wins over `noise` and `detail`: a larger detail needs a larger bound. It
+    /// also wins over a volume that is kept, where other vertices cannot make up for it. The report says how many vertices are at the bound. If `time`,
+    /// `energy`, `energy_ratio` or `steps` says when to stop and `detail` is not given, there is no default.
+    #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
+    pub max_distance: Option<f64>,
+
     /// Stop as soon as the Willmore energy is no more than PART of the energy at the beginning
     ///
     /// The volume changes, unless it is held by the option `volume` with the value keep.

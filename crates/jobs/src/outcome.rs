@@ -279,8 +279,15 @@ fn of_mesh(mesh: &MeshReport) -> String {
         (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
         _ => "the mesh is no longer closed, or folds over itself".to_owned(),
     };
+    let bound = match (mesh.max_distance, mesh.vertices_at_max_distance_percent) {
+        (Some(length), Some(percent)) if percent > 0.0 => format!(
+            "; {percent:.2} % of the vertices are at the distance {} from where the surface was, which `max_distance` allows",
+            five_digits(length)
+        ),
+        _ => String::new(),
+    };
     format!(
-        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}",
+        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}{bound}",
         mesh.displacement_rms,
         mesh.displacement_largest,
         mesh.displacement_rms_percent,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use engine::DISPLACEMENT;
-use surfaces::Followed;
+use surfaces::{Bound, Followed};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -30,6 +30,9 @@ pub struct OwnMesh {
     /// Whether its volume goes to a target, as that of the zero set does.
     #[serde(default)]
     pub drives_volume: bool,
+    /// The largest distance of vertices from the mesh as it was given.
+    #[serde(default)]
+    pub max_distance: Option<f64>,
     /// Whether the zero level set takes its place in the end.
     #[serde(default)]
     pub is_new: bool,
@@ -190,9 +193,30 @@ impl OwnMesh {
         });
         Ok(Known {
             volume: self.keeps_volume.then(|| self.rough().volume()),
+            max_distance: self.max_distance,
             measures: vec![gone],
             stops,
         })
+    }
+
+    /// The mesh with this volume, if one is given, by the vertices that are free, and with all vertices within the largest distance.
+    fn bounded(&self, mesh: TriangleMesh, volume: Option<f64>, free: &[bool]) -> TriangleMesh {
+        let whole = match volume {
+            Some(volume) => mesh.with_volume(volume, |vertex| free[vertex]),
+            None => mesh,
+        };
+        let Some(length) = self.max_distance else {
+            return whole;
+        };
+        // Where noise is taken off, it has the volume of the rough mesh already.
+        let volume = volume.or_else(|| (self.noise > 0.0).then(|| self.rough().volume()));
+        let bound = Bound::new(self.rough(), length);
+        match volume {
+            Some(volume) => bound.hold(&whole, |mesh, within| {
+                mesh.with_volume(volume, |vertex| free[vertex] && within[vertex])
+            }),
+            None => bound.clamp(&whole),
+        }
     }
 
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
@@ -201,16 +225,18 @@ impl OwnMesh {
         if self.is_new {
             let mut mesh = surface(u, eps)?;
             // That of the zero level set, but for what noise does not change.
-            if self.noise > 0.0 || self.keeps_volume {
-                let (grid, moving) = (u.grid(), self.nodes(u.grid()));
-                let moves = |vertex: usize| {
-                    let node = grid.nearest(mesh.vertices[vertex]);
-                    moving.as_ref().is_none_or(|moving| moving.contains(node))
-                };
-                mesh = mesh.with_volume(rough.volume(), moves);
-            }
+            let volume = (self.noise > 0.0 || self.keeps_volume).then(|| rough.volume());
+            let (grid, moving) = (u.grid(), self.nodes(u.grid()));
+            let moves = |x: [f64; 3]| {
+                (moving.as_ref()).is_none_or(|moving| moving.contains(grid.nearest(x)))
+            };
+            let free: Vec<bool> = mesh.vertices.iter().map(|&x| moves(x)).collect();
+            mesh = self.bounded(mesh, volume, &free);
             let mut made = Faired::anew(rough, mesh, up);
             made.report.noise = Some(self.noise);
+            if let Some(length) = self.max_distance {
+                made.report.bound(length, &made.displacement.lengths);
+            }
             return Ok(made);
         }
         let fairing = self.fairing();
@@ -221,9 +247,8 @@ impl OwnMesh {
             (_, true) => Some(ZeroSet::of(u, eps)?.volume),
             _ => None,
         };
-        if let Some(volume) = volume {
-            moved = moved.with_volume(volume, |v| !fairing.kept[v]);
-        }
+        let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
+        moved = self.bounded(moved, volume, &free);
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
@@ -238,11 +263,16 @@ impl OwnMesh {
             normals: None,
         };
         let lost = fairing.unresolved(&followed, thinnest(start.grid()));
-        let report = MeshReport {
+        let mut report = MeshReport {
             noise: Some(self.noise),
             left_behind_percent: Some(100.0 * followed.left_behind(u)?),
             ..MeshReport::new(rough, &moved, &lengths)
         };
+        if let Some(length) = self.max_distance {
+            let distances = MeshDistance::new(rough).signed_distances(&moved.vertices);
+            let distances: Vec<f64> = distances.into_iter().map(f64::abs).collect();
+            report.bound(length, &distances);
+        }
         Ok(Faired {
             displacement: Displacement {
                 mesh: moved,

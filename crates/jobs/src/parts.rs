@@ -1,7 +1,7 @@
 //! The parts of a segmentation, each of which keeps its own volume.
 
 use derive_more::Display;
-use surfaces::{Cells, Filling, Parts};
+use surfaces::{Bound, Cells, Filling, Parts};
 
 use crate::faired::{Faired, surface};
 use crate::prelude::*;
@@ -13,6 +13,8 @@ const FILE: &str = "voxels.ply";
 const SMALL: f64 = 1.5;
 /// The usual radius below which details go, in voxels.
 pub const DETAIL: f64 = 2.0;
+/// How far vertices usually may be from the surface between the voxels, in voxels.
+pub const MAX_DISTANCE: f64 = 0.5;
 /// Waves that are longer than some five times so many of these radii are those of the voxels.
 const LONG: f64 = 1.25;
 
@@ -30,6 +32,9 @@ pub struct Voxels {
     /// The time that ends the flow.
     #[serde(default)]
     pub time: Option<f64>,
+    /// The largest distance of vertices from the surface between the voxels.
+    #[serde(default)]
+    pub max_distance: Option<f64>,
     /// Whether parts and places keep their volumes.
     pub keeps_volumes: bool,
     /// The parts that do not flow, in ascending order.
@@ -179,13 +184,26 @@ impl Voxels {
     /// The surface of a phase field, whose parts and places have their volumes if they keep them.
     pub fn made(&self, u: &Stored<3>, eps: f64) -> Result<(TriangleMesh, Vec<PartReport>)> {
         if !self.keeps_volumes {
-            return Ok((surface(u, eps)?, Vec::new()));
+            return Ok((self.clamped(surface(u, eps)?), Vec::new()));
         }
         let made = surfaces::remeshed_surface(u, eps)?;
         match closed(made.clone()) {
             Some(made) => Ok(Matched::new(self, made).finish(self)),
             // One that folds over itself.
-            None => Ok((made, Vec::new())),
+            None => Ok((self.clamped(made), Vec::new())),
+        }
+    }
+
+    /// How far vertices may be from the surface between the voxels, if there is a bound.
+    fn bound(&self) -> Option<Bound> {
+        let length = self.max_distance?;
+        Some(Bound::new(self.surface(), length))
+    }
+
+    fn clamped(&self, mesh: TriangleMesh) -> TriangleMesh {
+        match self.bound() {
+            Some(bound) => bound.clamp(&mesh),
+            None => mesh,
         }
     }
 
@@ -194,6 +212,9 @@ impl Voxels {
         let (mesh, parts) = self.made(u, eps)?;
         let mut faired = Faired::anew(self.surface(), mesh, up);
         faired.report.parts = parts;
+        if let Some(length) = self.max_distance {
+            faired.report.bound(length, &faired.displacement.lengths);
+        }
         Ok(faired)
     }
 }
@@ -288,6 +309,11 @@ impl Matched {
         });
         let righted = righted.filter(|mesh| closed(mesh.clone()).is_some());
         let mut mesh = righted.unwrap_or_else(|| made.with_volumes(&self.new, &volumes));
+        if let Some(bound) = voxels.bound() {
+            mesh = bound.hold(&mesh, |mesh, free| {
+                mesh.with_volumes_by(&self.new, &volumes, |vertex| free[vertex])
+            });
+        }
         let parts = self.reports(voxels, &mesh);
         let whole = voxels.surface();
         let is_back =

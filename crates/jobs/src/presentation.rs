@@ -70,6 +70,8 @@ impl fmt::Display for Topology {
 pub struct Known<const D: usize> {
     /// Its volume, where that is known better than from the phase field.
     pub volume: Option<f64>,
+    /// How far the interface may go.
+    pub max_distance: Option<f64>,
     /// What is measured besides,
     pub measures: Vec<Measure<D>>,
     /// and what may end the flow besides.

@@ -121,6 +121,7 @@ impl Presentation<3> for Space {
         let mut known = Known::default();
         if let Some(voxels) = &self.voxels {
             known.volume = Some(voxels.volume);
+            known.max_distance = voxels.max_distance;
             known.measures.push(Measure::displacement(start, eps));
             known.stops.extend(voxels.time.map(Stop::Time));
             known.stops.extend(voxels.farthest.map(Stop::Displacement));

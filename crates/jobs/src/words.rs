@@ -176,7 +176,7 @@ const SPACE: [(&str, &str); 8] = [
     ),
 ];
 
-const NUMBERS: [(&str, &str); 21] = [
+const NUMBERS: [(&str, &str); 24] = [
     (
         "/energy_terms/spontaneous_curvature",
         "Spontaneous curvature in the energy, in one over units of the input",
@@ -228,6 +228,18 @@ const NUMBERS: [(&str, &str); 21] = [
     (
         "/mesh/hausdorff_distance_percent",
         "This distance, in percent of the longest side",
+    ),
+    (
+        "/mesh/max_distance",
+        "How far from the surface before vertices may be, in units of the input",
+    ),
+    (
+        "/mesh/vertices_at_max_distance",
+        "Vertices that are this far from it",
+    ),
+    (
+        "/mesh/vertices_at_max_distance_percent",
+        "These vertices, in percent of all",
     ),
     (
         "/mesh/area_change_percent",

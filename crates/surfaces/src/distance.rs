@@ -226,6 +226,16 @@ impl MeshDistance {
         points.par_iter().map(nearest).collect()
     }
 
+    /// The ways from the nearest point of the mesh to each of many points, in parallel; of NaN for points so far away that squares of distances
+    /// overflow.
+    pub fn offsets(&self, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let offset = |&x: &[f64; 3]| {
+            let nearest = (self.hierarchy).nearest(Vector::from_array(x) * self.scale, None);
+            nearest.map_or([f64::NAN; 3], |n| (n.offset / self.scale).to_array())
+        };
+        points.par_iter().map(offset).collect()
+    }
+
     /// The distances of many points, in parallel.
     pub fn signed_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let points = points.par_iter();

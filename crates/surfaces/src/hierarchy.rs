@@ -60,18 +60,15 @@ impl Leaf {
     fn bounds(&self, x: Vector) -> [f64; LEAF] {
         let mut least = [f64::INFINITY; LEAF];
         for [xs, ys, zs] in &self.corners {
-            for lane in 0..LEAF {
+            for (lane, least) in least.iter_mut().enumerate() {
                 let [dx, dy, dz] = [xs[lane] - x.x, ys[lane] - x.y, zs[lane] - x.z];
                 let squared = dx * dx + dy * dy + dz * dz;
-                least[lane] = if squared < least[lane] {
-                    squared
-                } else {
-                    least[lane]
-                };
+                // Not `min`, which looks for NaN.
+                *least = if squared < *least { squared } else { *least };
             }
         }
-        for lane in 0..LEAF {
-            least[lane] = least[lane] * (1.0 - ROUNDING) - self.room[lane];
+        for (least, room) in least.iter_mut().zip(&self.room) {
+            *least = *least * (1.0 - ROUNDING) - room;
         }
         least
     }

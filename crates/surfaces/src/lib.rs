@@ -56,6 +56,7 @@
 //! - Meshes are not periodic: they lie in the box of a grid, with a margin of a few `eps`.
 //! - The same input gives the same bytes, for any number of threads.
 
+mod bound;
 mod closed;
 mod distance;
 mod error;
@@ -81,6 +82,7 @@ mod triangle;
 mod vector;
 mod write;
 
+pub use bound::Bound;
 pub use closed::{ClosedMesh, Warning};
 pub use distance::{MeshDistance, hausdorff_distance};
 pub use error::Error;

@@ -102,9 +102,19 @@ fn origin(mesh: &TriangleMesh) -> Vector {
 impl TriangleMesh {
     /// The vertices of each part moved along their normals by a length of the part, so that it encloses its volume.
     pub fn with_volumes(&self, parts: &Parts, volumes: &[f64]) -> Self {
+        self.with_volumes_by(parts, volumes, |_| true)
+    }
+
+    /// The same by those vertices alone that may move.
+    pub fn with_volumes_by(
+        &self,
+        parts: &Parts,
+        volumes: &[f64],
+        moves: impl Fn(usize) -> bool,
+    ) -> Self {
         let mut moved = self.clone();
         for _ in 0..STEPS {
-            moved = moved.towards_volumes(parts, volumes);
+            moved = moved.towards_volumes(parts, volumes, &moves);
         }
         Self {
             normals: self.normals.clone(),
@@ -113,12 +123,13 @@ impl TriangleMesh {
     }
 
     /// One step of Newton's method.
-    pub(crate) fn towards_volumes(&self, parts: &Parts, volumes: &[f64]) -> Self {
-        let normals: Vec<Vector> = self
-            .vertex_normals()
-            .into_iter()
-            .map(Vector::from)
-            .collect();
+    pub(crate) fn towards_volumes(
+        &self,
+        parts: &Parts,
+        volumes: &[f64],
+        moves: impl Fn(usize) -> bool,
+    ) -> Self {
+        let normals = self.moving_normals(moves);
         let derivatives = parts.sums(self, |face, [a, b, c]| {
             let [u, v, w] = face.map(|vertex| normals[vertex as usize]);
             let sixfold = u.dot(b.cross(c)) + v.dot(c.cross(a)) + w.dot(a.cross(b));

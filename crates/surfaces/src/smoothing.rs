@@ -132,12 +132,17 @@ impl TriangleMesh {
         }
     }
 
+    /// The normals of the vertices, zero for those that may not move.
+    pub(crate) fn moving_normals(&self, moves: impl Fn(usize) -> bool) -> Vec<Vector> {
+        let normals = self.vertex_normals().into_iter().enumerate();
+        normals
+            .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
+            .collect()
+    }
+
     /// One step of Newton's method.
     fn towards_volume(&self, volume: f64, moves: impl Fn(usize) -> bool) -> Self {
-        let normals = self.vertex_normals().into_iter().enumerate();
-        let normals: Vec<Vector> = normals
-            .map(|(v, n)| if moves(v) { n.into() } else { Vector::ZERO })
-            .collect();
+        let normals = self.moving_normals(moves);
         let derivative = self.volume_derivative(&normals);
         if derivative == 0.0 {
             return self.clone();
@@ -162,7 +167,10 @@ impl TriangleMesh {
         for _ in 0..rounds {
             let mut x = moved.points();
             umbrellas.smooth(&mut x, 1, [0.5, 0.0]);
-            let mut x = self.on(&x).towards_volumes(parts, volumes).points();
+            let mut x = self
+                .on(&x)
+                .towards_volumes(parts, volumes, |_| true)
+                .points();
             for (vertex, (x, &from)) in x.iter_mut().zip(&original).enumerate() {
                 let way = *x - from;
                 *x = from + shortened(vertex, way.to_array()) * way;

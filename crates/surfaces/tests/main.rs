@@ -1,5 +1,6 @@
 //! Meshes: files, distances, isosurfaces.
 
+mod bounds;
 mod closed;
 mod common;
 mod distances;

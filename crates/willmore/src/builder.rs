@@ -40,6 +40,7 @@ pub struct Willmore<const D: usize> {
     keep: Keep,
     held: Option<Held>,
     region: Option<NodeSet>,
+    max_distance: Option<f64>,
     stops: Vec<Stop>,
     measures: Vec<Measure<D>>,
     own: Own<D>,
@@ -69,6 +70,7 @@ impl<const D: usize> Willmore<D> {
             keep: Keep::default(),
             held: None,
             region: None,
+            max_distance: None,
             stops: Vec::new(),
             measures: Vec::new(),
             own: Own::default(),
@@ -181,6 +183,13 @@ impl<const D: usize> Willmore<D> {
         self
     }
 
+    /// Keeps the interface within this distance of that of the start.
+    #[must_use]
+    pub fn max_distance(mut self, length: f64) -> Self {
+        self.max_distance = Some(length);
+        self
+    }
+
     /// What of the phase field is stored.
     #[must_use]
     pub fn storage(mut self, storage: Storage) -> Self {
@@ -256,6 +265,7 @@ impl<const D: usize> Willmore<D> {
         Ok(Case {
             held,
             region: self.region.clone(),
+            max_distance: self.max_distance,
             stops,
             own: self.own.clone(),
             ..case
