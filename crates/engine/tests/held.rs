@@ -107,3 +107,39 @@ fn targets_that_no_shape_has_on_the_way_are_refused() {
         "{refused}"
     );
 }
+
+/// A bound on the way of the interface is a part of the case, and stops what would go on.
+#[test]
+fn an_interface_goes_no_farther_than_its_bound() {
+    let free = driven(0, StepRule::Constant(TAU));
+    let free = Case {
+        held: Held::default(),
+        ..free
+    };
+    let length = 0.3 * grid(128).spacing();
+    let bound = Case {
+        max_distance: Some(length),
+        ..free.clone()
+    };
+    assert!(free.identity(&device())["max_distance"].is_null());
+    assert_eq!(bound.identity(&device())["max_distance"], length);
+    let start = free.initial.field().unwrap();
+    let farthest = |case: Case<2>| {
+        let u = finished(case).field().clone();
+        let gone = |(u, start): (&f64, &f64)| {
+            let depth = |u| geometry::distance_from_phase_field(u, EPS);
+            if start.abs() < 0.6 {
+                (depth(*u) - depth(*start)).abs()
+            } else {
+                0.0
+            }
+        };
+        let pairs = u.values().iter().zip(start.values());
+        pairs.map(gone).fold(0.0, f64::max)
+    };
+    let [free, bound] = [free, bound].map(farthest);
+    assert!(
+        bound < 1.01 * length && free > 1.5 * length,
+        "{bound} {free} {length}"
+    );
+}
