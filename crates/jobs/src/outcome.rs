@@ -279,9 +279,9 @@ fn of_mesh(mesh: &MeshReport) -> String {
         (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
         _ => "the mesh is no longer closed, or folds over itself".to_owned(),
     };
-    let bound = match (mesh.max_distance, mesh.vertices_at_max_distance_percent) {
-        (Some(length), Some(percent)) if percent > 0.0 => format!(
-            "; {percent:.2} % of the vertices are at the distance {} from where the surface was, which `max_distance` allows",
+    let bound = match (mesh.max_distance, mesh.vertices_at_max_distance) {
+        (Some(length), Some(count)) if count > 0 => format!(
+            "; vertices that are at the distance {} from where the surface was, which `max_distance` allows: {count}",
             five_digits(length)
         ),
         _ => String::new(),
