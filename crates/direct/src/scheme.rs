@@ -101,12 +101,14 @@ impl<const D: usize> Direct<D> {
     /// Refuses what direct steps cannot do.
     ///
     /// # Errors
-    /// [`Error::NotDirect`] for held sizes, terms of the energy besides bending, and active bricks.
+    /// [`Error::NotDirect`] for held sizes, terms of the energy besides bending, bounds on the displacement, and active bricks.
     pub fn check(problem: &Problem<D>, from: &State<D>) -> Result<(), Error> {
         let what = if !problem.held.is_empty() {
             "held sizes"
         } else if !problem.terms.is_empty() {
             "terms of the energy besides bending"
+        } else if problem.bounds.is_some() {
+            "bounds on the displacement"
         } else if from.field.nodes().bricks().is_some() {
             "active bricks"
         } else {
