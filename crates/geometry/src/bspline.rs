@@ -156,16 +156,14 @@ fn quintic(t: f64) -> Weights {
             powers(3, 1.0 / 6.0),
         ]
     };
-    let mut weights = [[0.0; REACH]; 3];
-    for k in 0..REACH {
+    let of_node = |k: usize| {
         let x = t + 2.0 - k as f64;
-        let of_size = derivatives(x.abs());
-        for (order, value) in of_size.into_iter().enumerate() {
-            // The slope is odd.
-            weights[order][k] = if order == 1 && x < 0.0 { -value } else { value };
-        }
-    }
-    weights
+        let [value, slope, bend] = derivatives(x.abs());
+        // The slope is odd.
+        [value, if x < 0.0 { -slope } else { slope }, bend]
+    };
+    let of_nodes: [[f64; 3]; REACH] = from_fn(of_node);
+    from_fn(|order| of_nodes.map(|of_node| of_node[order]))
 }
 
 /// Takes values at the nodes to coefficients along an axis.

@@ -307,9 +307,9 @@ fn carry<const D: usize>(
         for count in 0..rows {
             let row = if is_back(0) { rows - 1 - count } else { count };
             let mut place = grid.multi_index(row * cells);
-            for axis in 1..last {
+            for (axis, at) in place.iter_mut().enumerate().take(last).skip(1) {
                 if is_back(axis) != is_back(0) {
-                    place[axis] = cells - 1 - place[axis];
+                    *at = cells - 1 - *at;
                 }
             }
             let start = grid.index(place);
