@@ -1,7 +1,7 @@
 //! The kernel of a direct step.
 
 use std::array::from_fn;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use crate::profile::Profile;
 
@@ -12,14 +12,35 @@ const STRENGTH: f64 = 0.83;
 
 /// A heat kernel `exp(-r^2 / 4t)` in the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Part {
-    time: f64,
+pub struct HeatKernel {
+    /// `t`, the square of a length.
+    pub time: f64,
     /// Its weight `b` in the multiplier of waves.
-    weight: f64,
+    pub weight: f64,
     /// `sqrt(4 pi t) / P`, which makes up for the profile: `P` is its mean under the kernel.
     height: f64,
+    /// Width of the profile.
+    width: f64,
     /// Second moment of the profile under the kernel, over its mean.
     variance: f64,
+}
+
+impl HeatKernel {
+    /// Its spectrum `sqrt(4 pi t) / P(t) exp(-t |k|^2)` at the squared wave number, without its weight.
+    pub fn symbol(&self, square: f64) -> f64 {
+        self.height * (-self.time * square).exp()
+    }
+
+    /// What its convolution with the profile is at a distance from a flat interface, and the derivative of that, which is 2 at the interface.
+    pub fn flat(&self, distance: f64) -> [f64; 2] {
+        let square = self.width * self.width;
+        let variance = square + 2.0 * self.time;
+        let x = distance / variance.sqrt();
+        let density = (-0.5 * x * x).exp() / (TAU * variance).sqrt();
+        let value = libm::erf(x * FRAC_1_SQRT_2) + square * distance / variance * density;
+        let slope = (2.0 + square / variance * (1.0 - x * x)) * density;
+        [self.height * value, self.height * slope]
+    }
 }
 
 /// The kernel `K` of a step of size `tau`, by its spectrum `sum_i b_i sqrt(4 pi t_i) / P(t_i) exp(-t_i |k|^2)`, which is the same in the plane and in
@@ -30,7 +51,7 @@ struct Part {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kernel {
     tau: f64,
-    parts: [Part; 4],
+    parts: [HeatKernel; 4],
 }
 
 impl Kernel {
@@ -40,9 +61,10 @@ impl Kernel {
         let part = |i: usize| {
             let time = TIMES[i] * scale;
             let [mean, second] = profile.moments(time);
-            Part {
+            HeatKernel {
                 time,
                 weight: weight(i),
+                width: spacing,
                 height: (4.0 * PI * time).sqrt() / mean,
                 variance: second / mean,
             }
@@ -55,21 +77,26 @@ impl Kernel {
 
     /// The spectrum at the squared wave number `|k|^2`.
     pub fn symbol(&self, square: f64) -> f64 {
-        let part = |part: &Part| part.weight * part.height * (-part.time * square).exp();
+        let part = |part: &HeatKernel| part.weight * part.height * (-part.time * square).exp();
         self.parts.iter().map(part).sum()
     }
 
     /// The factor of a small wave of wave number `k` on a flat interface in one step; that of Willmore flow is `exp(-tau k^4)`.
     pub fn multiplier(&self, k: f64) -> f64 {
-        let part = |part: &Part| part.weight * (-part.time * k * k).exp();
+        let part = |part: &HeatKernel| part.weight * (-part.time * k * k).exp();
         self.parts.iter().map(part).sum()
     }
 
     /// By which part the nonlinear terms of the velocity, `kappa^3 / 2` in the plane and `h (k1 - k2)^2 / 2` in space, come out too large:
     /// `-sum b t v / 4 tau` with the second moments `v` of the profile.
     pub fn excess(&self) -> f64 {
-        let part = |part: &Part| part.weight * part.time * part.variance;
+        let part = |part: &HeatKernel| part.weight * part.time * part.variance;
         -self.parts.iter().map(part).sum::<f64>() / (4.0 * self.tau)
+    }
+
+    /// The heat kernels, by increasing time.
+    pub fn heat_kernels(&self) -> &[HeatKernel; 4] {
+        &self.parts
     }
 
     /// The largest time of its heat kernels.
@@ -97,13 +124,37 @@ mod tests {
     fn the_weights_have_their_moments() {
         let kernel = Kernel::new(0.01, 2e-5);
         for (power, expected) in [1.0, 0.0, -4e-5, 0.0].into_iter().enumerate() {
-            let part = |part: &Part| part.weight * part.time.powi(power as i32);
+            let part = |part: &HeatKernel| part.weight * part.time.powi(power as i32);
             let moment: f64 = kernel.parts.iter().map(part).sum();
             let scale = 2e-5_f64.powf(0.5 * power as f64);
             assert!(
                 (moment - expected).abs() < 1e-10 * scale,
                 "{power}: {moment}"
             );
+        }
+    }
+
+    /// By quadrature of the profile on a line.
+    #[test]
+    fn flat_interfaces_are_as_the_convolution_has_them() {
+        let (profile, step) = (Profile { width: 0.1 }, 1e-3);
+        for kernel in Kernel::new(0.1, 2e-3).heat_kernels() {
+            let variance = 2.0 * kernel.time;
+            let convolved = |x: f64| -> f64 {
+                let part = |k: i32| {
+                    let y = f64::from(k) * step;
+                    profile.of(x - y) * (-0.5 * y * y / variance).exp()
+                };
+                let sum: f64 = (-4000..=4000).map(part).sum();
+                kernel.height * step * sum / (TAU * variance).sqrt()
+            };
+            for x in [-0.7, 0.0, 0.1, 0.3] {
+                let [value, slope] = kernel.flat(x);
+                assert!((value - convolved(x)).abs() < 1e-6, "{x}: {value}");
+                let difference = (convolved(x + step) - convolved(x - step)) / (2.0 * step);
+                assert!((slope - difference).abs() < 1e-4, "{x}: {slope}");
+            }
+            assert!((kernel.flat(0.0)[1] - 2.0).abs() < 1e-12);
         }
     }
 

@@ -12,7 +12,7 @@
 //! up to terms of second order in $`\tau`$. The step ends with the signed distance to that level ([`geometry::Redistanced`]). `docs/direct.md` has
 //! the theory. Grzhibovskis and Heintz (Interfaces Free Bound. 10, 2008) do the same with indicator functions.
 //!
-//! [`Direct`] is a [`Scheme`](solver::Scheme) of second order:
+//! [`DirectSteps`] makes single steps of first order; [`Direct`] is a [`Scheme`](solver::Scheme) of second order:
 //!
 //! ```
 //! use direct::Direct;
@@ -47,5 +47,6 @@ mod profile;
 mod scheme;
 mod step;
 
-pub use kernel::Kernel;
+pub use kernel::{HeatKernel, Kernel};
 pub use scheme::{Direct, DirectParams};
+pub use step::DirectSteps;

@@ -136,7 +136,7 @@ impl<const D: usize> DirectSteps<D> {
     /// The distances to the zero level of a function of distances, through a profile that the grid resolves well.
     fn level(&self, distances: &[f64], eps: f64) -> Redistanced<D> {
         let wide = |node: usize| -optimal_profile(distances[node], WIDER * eps);
-        self.redistanced(parallel::values(distances.len(), wide), Needed::All)
+        self.redistanced(parallel::values(distances.len(), wide))
     }
 
     /// Both runs at the start of a flow.
@@ -157,11 +157,11 @@ impl<const D: usize> DirectSteps<D> {
 
     /// Both runs after a part of a step.
     fn both(&mut self, runs: &Runs, tau: f64, free: Free<'_>, needed: Needed) -> Runs {
-        let whole = self.step(&runs.whole, tau, needed);
-        let middle = self.step(&runs.half, 0.5 * tau, Needed::Near);
+        let whole = self.step_as(&runs.whole, tau, needed);
+        let middle = self.step_as(&runs.half, 0.5 * tau, Needed::Near);
         let middle = free.of(middle.distances, &runs.half);
         // All distances, for the reach.
-        let half = self.step(&middle, 0.5 * tau, Needed::All);
+        let half = self.step(&middle, 0.5 * tau);
         Runs {
             reach: half.reach(),
             whole: free.of(whole.distances, &runs.whole),

@@ -22,22 +22,48 @@ pub(crate) enum Needed {
     All,
 }
 
-/// Direct steps on a grid, with what is prepared for their sizes.
-pub(crate) struct DirectSteps<const D: usize> {
+/// Single direct steps of first order on a grid, from distances to distances, with what is prepared for their sizes.
+///
+/// ```
+/// use direct::DirectSteps;
+/// use geometry::{Grid, exact::willmore_radius};
+///
+/// let grid = Grid::<2>::centred(64, 1.0)?;
+/// let disc: Vec<f64> = (0..grid.len()).map(|i| grid.node(i)).map(|[x, y]| x.hypot(y) - 0.25).collect();
+/// let mut steps = DirectSteps::new(grid);
+/// let (tau, node) = (steps.shortest(), grid.nearest([0.25, 0.0]));
+/// let moved = disc[node] - steps.step(&disc, tau).distances[node];
+/// let exact = willmore_radius(0.25, tau, 2) - 0.25;
+/// assert!((moved / exact - 1.0).abs() < 1e-2);
+/// # Ok::<(), geometry::Error>(())
+/// ```
+pub struct DirectSteps<const D: usize> {
     grid: Grid<D>,
-    prepared: Vec<(Kernel, f64, SpectralFilter)>,
+    /// Convolutions by the size of their step.
+    prepared: Vec<(f64, SpectralFilter)>,
 }
 
 impl<const D: usize> DirectSteps<D> {
-    pub(crate) fn new(grid: Grid<D>) -> Self {
+    /// The steps on a grid, before anything is prepared.
+    pub fn new(grid: Grid<D>) -> Self {
         Self {
             grid,
             prepared: Vec::new(),
         }
     }
 
+    /// The grid.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
     /// The distances to the zero level of a function, negative where it is.
-    pub(crate) fn redistanced(&self, values: Vec<f64>, needed: Needed) -> Redistanced<D> {
+    pub fn redistanced(&self, values: Vec<f64>) -> Redistanced<D> {
+        self.redistanced_as(values, Needed::All)
+    }
+
+    /// The same as far as distances are needed, and infinite beyond.
+    fn redistanced_as(&self, values: Vec<f64>, needed: Needed) -> Redistanced<D> {
         let precise = Profile::PURE * self.grid.spacing();
         let largest = match needed {
             Needed::Near => precise,
@@ -47,19 +73,55 @@ impl<const D: usize> DirectSteps<D> {
     }
 
     /// The size of the shortest step whose kernel the grid resolves.
-    pub(crate) fn shortest(&self) -> f64 {
+    pub fn shortest(&self) -> f64 {
         SHORTEST * self.grid.spacing().powi(4)
     }
 
-    /// The distances after a step of size `tau`; infinite where they are not needed.
-    pub(crate) fn step(&mut self, distances: &[f64], tau: f64, needed: Needed) -> Redistanced<D> {
-        let profile = Profile {
-            width: self.grid.spacing(),
-        };
-        let values = parallel::values(distances.len(), |node| profile.of(distances[node]));
-        let (kernel, filter) = self.filter(tau);
-        let mut made = self.redistanced(filter.apply(&values), needed);
-        let excess = 0.5 * tau * kernel.excess();
+    /// The kernel of a step of size `tau`.
+    pub fn kernel(&self, tau: f64) -> Kernel {
+        Kernel::new(self.grid.spacing(), tau)
+    }
+
+    /// The distances after a step of size `tau`.
+    ///
+    /// # Panics
+    /// Unless there is a distance for each node; so do the functions below.
+    pub fn step(&mut self, distances: &[f64], tau: f64) -> Redistanced<D> {
+        self.step_as(distances, tau, Needed::All)
+    }
+
+    /// The same as far as distances are needed, and infinite beyond.
+    pub(crate) fn step_as(
+        &mut self,
+        distances: &[f64],
+        tau: f64,
+        needed: Needed,
+    ) -> Redistanced<D> {
+        let values = self.convolved(distances, tau);
+        self.finished_as(values, tau, needed)
+    }
+
+    /// `K * q(s)`, whose gradient at the interface is nearly 2.
+    pub fn convolved(&mut self, distances: &[f64], tau: f64) -> Vec<f64> {
+        let values = self.profiles(distances);
+        self.filter(tau).apply(&values)
+    }
+
+    /// The same with each of the [heat kernels](Kernel::heat_kernels) alone, without their weights.
+    pub fn smoothed(&self, distances: &[f64], tau: f64) -> [Vec<f64>; 4] {
+        let (values, kernel) = (self.profiles(distances), self.kernel(tau));
+        let heat_kernels = kernel.heat_kernels();
+        heat_kernels.map(|heat| self.spectral(|square| heat.symbol(square)).apply(&values))
+    }
+
+    /// The end of a step: the distances to the zero level of what the convolution gave, with the correction for the [excess](Kernel::excess).
+    pub fn finished(&self, values: Vec<f64>, tau: f64) -> Redistanced<D> {
+        self.finished_as(values, tau, Needed::All)
+    }
+
+    fn finished_as(&self, values: Vec<f64>, tau: f64, needed: Needed) -> Redistanced<D> {
+        let mut made = self.redistanced_as(values, needed);
+        let excess = 0.5 * tau * self.kernel(tau).excess();
         let shifts: Vec<f64> = made.points.iter().map(|p| excess * nonlinear(p)).collect();
         let (nearest, distances) = (&made.nearest, &made.distances);
         made.distances = parallel::values(distances.len(), |node| {
@@ -69,23 +131,36 @@ impl<const D: usize> DirectSteps<D> {
         made
     }
 
-    /// The kernel of a step, and the convolution with it.
-    fn filter(&mut self, tau: f64) -> (Kernel, SpectralFilter) {
-        let known = |(_, size, _): &&(Kernel, f64, SpectralFilter)| size.to_bits() == tau.to_bits();
-        if let Some((kernel, _, filter)) = self.prepared.iter().find(known) {
-            return (*kernel, filter.clone());
-        }
+    /// The profile at the nodes.
+    fn profiles(&self, distances: &[f64]) -> Vec<f64> {
+        let profile = Profile {
+            width: self.grid.spacing(),
+        };
+        parallel::values(distances.len(), |node| profile.of(distances[node]))
+    }
+
+    /// The convolution with this spectrum, a function of the squared wave number.
+    fn spectral(&self, symbol: impl Fn(f64) -> f64) -> SpectralFilter {
         let h = self.grid.spacing();
-        let kernel = Kernel::new(h, tau);
-        let filter = SpectralFilter::from_symbol(&self.grid.shape(), |theta| {
+        SpectralFilter::from_symbol(&self.grid.shape(), |theta| {
             let wave = |theta: &f64| if *theta > PI { *theta - TAU } else { *theta };
-            kernel.symbol(theta.iter().map(|theta| (wave(theta) / h).powi(2)).sum())
-        });
+            symbol(theta.iter().map(|theta| (wave(theta) / h).powi(2)).sum())
+        })
+    }
+
+    /// The convolution with the kernel of a step.
+    fn filter(&mut self, tau: f64) -> SpectralFilter {
+        let known = |(size, _): &&(f64, SpectralFilter)| size.to_bits() == tau.to_bits();
+        if let Some((_, filter)) = self.prepared.iter().find(known) {
+            return filter.clone();
+        }
+        let kernel = self.kernel(tau);
+        let filter = self.spectral(|square| kernel.symbol(square));
         if self.prepared.len() >= PREPARED {
             self.prepared.remove(0);
         }
-        self.prepared.push((kernel, tau, filter.clone()));
-        (kernel, filter)
+        self.prepared.push((tau, filter.clone()));
+        filter
     }
 }
 
@@ -109,7 +184,7 @@ mod tests {
         };
         let distances = parallel::values(grid.len(), distance);
         let tau = x * RADIUS.powi(4);
-        let made = DirectSteps::new(grid).step(&distances, tau, Needed::Near);
+        let made = DirectSteps::new(grid).step(&distances, tau);
         // The mean of the distances at the old level is minus the displacement.
         let (mut sum, mut count) = (0.0, 0.0);
         for (old, new) in distances.iter().zip(&made.distances) {
