@@ -22,6 +22,7 @@ pub mod equilibria;
 pub mod experiment;
 pub mod harness;
 pub mod inpainting;
+pub mod learning;
 pub mod mesh_flow;
 pub mod meshes;
 pub mod metrics;

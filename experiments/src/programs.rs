@@ -23,6 +23,7 @@ pub mod inpainting_3d;
 pub mod denoising;
 pub mod unshrinking;
 pub mod performance;
+pub mod direct_learning;
 pub mod train_networks;
 pub mod mesh_distance;
 

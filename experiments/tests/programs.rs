@@ -16,6 +16,7 @@ use operators::ComputeDevice;
 const CALIBRATION: &str = "calibration";
 const CIRCLES: &str = "circle_convergence";
 const DENOISING: &str = "denoising";
+const DIRECT_LEARNING: &str = "direct_learning";
 const ELASTICA: &str = "elastica";
 const INPAINTING: &str = "inpainting_2d";
 const LEARNED: &str = "learned_networks";
@@ -324,6 +325,31 @@ fn the_quick_calibration_predicts_the_energies_and_installs_the_network() {
         &["--quick", "--network", "missing.safetensors"],
         &["missing.safetensors"],
     );
+}
+
+#[test]
+#[ignore = "two whole quick runs: see scripts/test_long"]
+fn the_quick_learning_teaches_what_it_is_given_and_is_reproducible() {
+    let runs = ["first", "second"].map(|name| {
+        let root = tempfile::tempdir().unwrap();
+        let arguments = ["--quick", "--quiet", "--output", "out"];
+        let summary = finished(DIRECT_LEARNING, root.path(), &arguments);
+        let file = |name: &str| fs::read_to_string(root.path().join("out").join(name)).unwrap();
+        let files = ["errors.csv", "rollouts.csv", "multipliers.svg"].map(file);
+        assert!(files.iter().all(|text| text.lines().count() > 1), "{name}");
+        (summary, files)
+    });
+    assert_eq!(runs[0].1, runs[1].1);
+    let summary = &runs[0].0;
+    for network in ["curvature", "geometry", "filters"] {
+        let loss = |end: &str| summary[&format!("{network}.loss_{end}")];
+        assert!(loss("after") < 0.5 * loss("before"), "{network}");
+    }
+    let circles = |network: &str| summary[&format!("training_circles.tau0.001.{network}.rms")];
+    assert!(circles("curvature") < 0.2 * circles("derived"));
+    // A derived step is near to the flow, and its small waves do not grow.
+    assert!(summary["ellipse.tau0.001.derived.rms"] < 0.1);
+    assert!(summary["derived.multiplier"] < 1.0 && summary["derived.fast_multiplier"] > 0.5);
 }
 
 #[test]

@@ -1,0 +1,9 @@
+//! Learning what a direct step of Willmore flow misses: curves with their exact flow, corrections of the step, and their training.
+
+mod corrections;
+mod curves;
+mod training;
+
+pub use corrections::{Correction, Form, Network, Rows, level};
+pub use curves::{Curves, Example, Pair};
+pub use training::{AdamParams, Taught, from_energy, from_pairs};
