@@ -146,7 +146,8 @@ struct Movement<'a> {
     energy: MinimizingMovement<2>,
     /// Nodes near the interface, whose feet are corrected.
     nodes: Vec<usize>,
-    /// `1/2 |u - a|^2` of the derived step.
+    /// The energy of the derived step, and the part `1/2 |u - a|^2` of it.
+    derived: f64,
     motion: f64,
 }
 
@@ -175,6 +176,7 @@ impl<'a> Movement<'a> {
         let stiffness = problem.params.stiffness(pair.tau);
         let mut energy = MinimizingMovement::new(problem.operator, cells, device)?;
         energy.set(&device.tensor(&before, grid.shape()), stiffness)?;
+        let derived_energy = energy.value(&device.tensor(&after, grid.shape()))?;
         let nodes = 0..derived.len();
         Ok(Self {
             pair,
@@ -183,6 +185,7 @@ impl<'a> Movement<'a> {
             nodes: nodes
                 .filter(|node| derived[*node].abs() < PURE * eps)
                 .collect(),
+            derived: derived_energy,
             motion,
         })
     }
@@ -198,7 +201,7 @@ impl<'a> Movement<'a> {
             .collect()
     }
 
-    /// The energy over that of the motion, and its derivatives by the corrections of the nodes.
+    /// By how much the energy is above that of the derived step, over that of its motion, and the derivatives by the corrections of the nodes.
     fn evaluate(&mut self, corrections: &[f64], device: &ComputeDevice) -> Result<(f64, Vec<f64>)> {
         let (eps, mut distances) = (self.eps, self.pair.derived.distances.clone());
         for (node, correction) in self.nodes.iter().zip(corrections) {
@@ -215,7 +218,7 @@ impl<'a> Movement<'a> {
             .nodes
             .iter()
             .map(|node| by_correction(node) / self.motion);
-        Ok((energy / self.motion, derivatives.collect()))
+        Ok(((energy - self.derived) / self.motion, derivatives.collect()))
     }
 }
 

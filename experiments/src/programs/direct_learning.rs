@@ -68,8 +68,8 @@ const METRICS: MetricTable = MetricTable {
         ),
         (
             "CORRECTION.loss_before, CORRECTION.loss_after",
-            "loss of the first and of the last step of the training: the mean of the squared error over that of the derived step; of `energy` the mean \
-             energy over that of the motion of the derived step",
+            "loss of the first and of the last step of the training: the mean of the squared error over that of the derived step; of `energy` \
+             by how much the mean energy is above that of the derived step, over that of its motion",
         ),
     ],
 };
@@ -290,15 +290,15 @@ fn teach(
     let forms = [
         (
             "curvature",
-            "learned of κ, from circles",
+            "network of κ, by circles",
             4,
             Form::Curvature,
             &circles,
         ),
-        ("geometry", "learned of κ and d", 2, Form::Geometry, &taught),
+        ("geometry", "network of κ and d", 2, Form::Geometry, &taught),
         (
             "filters",
-            "learned of the filters",
+            "network of the filters",
             0,
             Form::Filters,
             &taught,
@@ -316,7 +316,7 @@ fn teach(
     methods.push(learned(
         session,
         "energy",
-        "of the filters, from energy",
+        "network of the filters, by energy",
         1,
         taught,
     )?);
