@@ -42,7 +42,7 @@ const METRICS: MetricTable = MetricTable {
         (
             "CURVES",
             "`training_circles`, `training_ellipses` and `training_waves`, which were taught; the others were not: `ellipse`, `waves` of another \
-             seed, `cross` and `rectangle` from the time `32 * 2^-14` on",
+             seed, `cross` and `rectangle` from the time 32 / 16384 on",
         ),
         (
             "CORRECTION",
