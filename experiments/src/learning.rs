@@ -6,4 +6,4 @@ mod training;
 
 pub use corrections::{Correction, Form, Network, Rows, level};
 pub use curves::{Curves, Example, Pair};
-pub use training::{AdamParams, Taught, from_energy, from_pairs};
+pub use training::{AdamParams, Taught, energy_of_exact_steps, from_energy, from_pairs};

@@ -271,6 +271,22 @@ pub fn from_energy(
     Ok((network, losses))
 }
 
+/// What the loss of [`from_energy`] is for the exact steps: above zero, they have more energy than the derived ones.
+///
+/// # Errors
+/// Those of the exact flow and of the energy.
+pub fn energy_of_exact_steps(pairs: &[&Pair<'_>], device: &ComputeDevice) -> Result<f64> {
+    let mut sum = 0.0;
+    for &pair in pairs {
+        let (example, mut movement) = (pair.example, Movement::new(pair, device)?);
+        let exact = example.exact(&[pair.tau])?.remove(0).signed_distance();
+        let missed = |node: &usize| pair.derived.distances[*node] - exact(example.grid.node(*node));
+        let corrections: Vec<f64> = movement.feet().iter().map(missed).collect();
+        sum += movement.evaluate(&corrections, device)?.0;
+    }
+    Ok(sum / pairs.len() as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

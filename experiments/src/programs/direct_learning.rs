@@ -1,5 +1,6 @@
 use crate::learning::{
-    AdamParams, Correction, Curves, Example, Form, Pair, Taught, from_energy, from_pairs, level,
+    AdamParams, Correction, Curves, Example, Form, Pair, Taught, energy_of_exact_steps,
+    from_energy, from_pairs, level,
 };
 use crate::prelude::*;
 use direct::DirectSteps;
@@ -70,6 +71,10 @@ const METRICS: MetricTable = MetricTable {
             "CORRECTION.loss_before, CORRECTION.loss_after",
             "loss of the first and of the last step of the training: the mean of the squared error over that of the derived step; of `energy` \
              by how much the mean energy is above that of the derived step, over that of its motion",
+        ),
+        (
+            "CORRECTION.loss_exact",
+            "what the latter is for exact steps",
         ),
     ],
 };
@@ -313,6 +318,8 @@ fn teach(
     let taught = session.phase("training: energy", |stage| {
         from_energy(Form::Filters, &few, size.energy, seed, stage.device)
     })?;
+    let of_exact = energy_of_exact_steps(&few, &session.device)?;
+    session.metric("energy.loss_exact", of_exact)?;
     methods.push(learned(
         session,
         "energy",
