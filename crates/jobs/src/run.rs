@@ -465,7 +465,7 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<TimeAccuracy> {
 /// What direct steps say of themselves.
 fn direct_report(records: &[Record]) -> Option<DirectReport> {
     let steps = records.iter().filter_map(Record::direct);
-    let last = steps.clone().last()?;
+    let last = steps.clone().next_back()?;
     Some(DirectReport {
         convolutions: steps.map(|step| step.convolutions).sum(),
         apart: last.apart,
