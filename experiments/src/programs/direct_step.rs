@@ -514,12 +514,12 @@ fn circles(session: &mut Session) -> Result<()> {
     Ok(())
 }
 
-/// Waves on a circle over a thousand parts of steps: what is left of them.
+/// Waves on a circle over more than a thousand parts of steps: what is left of them.
 fn waves(session: &mut Session) -> Result<()> {
     const RADIUS: f64 = 0.35;
     const AMPLITUDE: f64 = 1e-3;
     const LENGTH: f64 = 2e-4;
-    let parts = session.options.either(50.0, 1000.0);
+    let parts = session.options.either(50.0, 1200.0);
     let grid = Grid::<2>::per_unit(64, 1.5)?;
     let shape = |x: [f64; 2]| {
         let angle = x[1].atan2(x[0]);
