@@ -607,7 +607,7 @@ fn surfaces(session: &mut Session) -> Result<Vec<SurfaceRow>> {
         side: truth::DISK.side,
         shape: (truth::DISK.curve)()?,
         from: time(8),
-        marks: vec![10, 12, 16, 24],
+        marks: vec![9, 10, 12],
     };
     let controlled = Way::Controlled("controlled", ErrorControl::default());
     let sizes: &[usize] = if quick { &[32] } else { &[32, 64] };
