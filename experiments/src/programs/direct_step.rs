@@ -34,11 +34,11 @@ pub const EXPERIMENT: Experiment = Experiment {
     words: &[
         (
             "SURFACE",
-            "`ellipsoid`, 3:2, `disk`, the thick disk from the exact surface at `8 2^-14` on",
+            "`ellipsoid`, 3:2, `disk`, the thick disk from the exact surface at 8 2^-14 on",
         ),
         (
             "START",
-            "`cross32`, `rectangle32`: the exact curve at `t = 32 2^-14`, run to `128 2^-14`; `cross`, `rectangle`: from the corners to that time; \
+            "`cross32`, `rectangle32`: the exact curve at t = 32 2^-14, run to 128 2^-14; `cross`, `rectangle`: from the corners to that time; \
          `ellipse`, `random`: smooth curves, until half of the way to the circle",
         ),
     ],
@@ -49,9 +49,9 @@ const METRICS: MetricTable = MetricTable {
     note: "",
     words: &[(
         "STEPS",
-        "`direct0.004` and so on, direct steps by their longest part over the fourth power of the reach; `controlled` and \
-         `controlled_strict`, minimizations of second order; `euler1` and so on, implicit Euler with so many steps in `2^-14`; `elements`, implicit \
-         Euler with nested finite elements; `then_direct`, second order to `8 2^-14` and then direct",
+        "`direct0.004`, `direct0.002`, `direct0.001`, `direct0.0007` and `direct0.0005`, direct steps by their longest part over the fourth power of the reach; `controlled` and \
+         `controlled_strict`, minimizations of second order; `euler1` and `euler2`, implicit Euler with so many steps in 2^-14; `elements`, implicit \
+         Euler with nested finite elements; `then_direct`, second order to 8 2^-14 and then direct",
     )],
     rows: &[
         (
@@ -68,7 +68,7 @@ const METRICS: MetricTable = MetricTable {
             "the time of half of the way to the circle",
         ),
         (
-            "circles.n128.STEPS.l2, circles.n128.STEPS.convolutions",
+            "circles.nN.STEPS.l2, circles.nN.STEPS.convolutions",
             "mean L2 error of the 30 circles of `circle_convergence` after the time `64 2^-14`, and mean convolutions",
         ),
         (
