@@ -4,6 +4,6 @@ mod corrections;
 mod curves;
 mod training;
 
-pub use corrections::{Correction, Form, Network, Rows, level};
+pub use corrections::{Correction, Form, Network, Rows};
 pub use curves::{Curves, Example, Pair};
 pub use training::{AdamParams, Taught, energy_of_exact_steps, from_energy, from_pairs};

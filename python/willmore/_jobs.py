@@ -259,8 +259,8 @@ def flow(
     tau : float or str, optional
         Equal time steps, or another rule: see ``willmore flow --help``.
     stepper : {"minimizing", "direct"}, optional
-        Minimizations with the learned operator (default), or direct steps: convolutions, faster and more accurate on smooth shapes, of the bending
-        energy alone.
+        Minimizations with the learned operator (default), or direct steps by convolutions. On smooth shapes direct steps are nearer to the exact flow.
+        They hold no sizes and have no other terms of the energy than bending.
     volume, area, length : "keep", float or "90%", optional
         Sizes that stay, or that go to a value or to a part of them. In the plane, `area` is that of the inside.
     reduced_volume : float, optional

@@ -94,7 +94,10 @@ fn direct_steps_reach_the_same_shape_and_say_what_they_are() {
         (convolutions.iter().sum::<f64>() - all).abs() < 0.5 && all > 10.0,
         "{direct}"
     );
-    assert!(number(&direct, "/direct_steps/apart") < 1e-3, "{direct}");
+    assert!(
+        number(&direct, "/direct_steps/run_distance") < 1e-3,
+        "{direct}"
+    );
     assert_eq!(direct["direct_steps"]["energy_increases"], 0, "{direct}");
     let error = number(&minimizing, "/time_steps/estimated_error");
     assert!(

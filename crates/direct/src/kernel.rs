@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use crate::profile::Profile;
 
-/// Times of the heat kernels over [the scale](SCALE) `sqrt tau`: near each other, so that the kernel is narrow.
+/// Times of the heat kernels over `sqrt(tau / STRENGTH)`: near each other, so that the kernel is narrow.
 const TIMES: [f64; 4] = [0.75, 0.9, 1.08, 1.3];
 /// With it the multipliers of waves are in (-0.89, 1]; with more than 0.89 steps are unstable.
 const STRENGTH: f64 = 0.83;
@@ -87,7 +87,7 @@ impl Kernel {
         self.parts.iter().map(part).sum()
     }
 
-    /// By which part the nonlinear terms of the velocity, `kappa^3 / 2` in the plane and `h (k1 - k2)^2 / 2` in space, come out too large:
+    /// By which part the nonlinear terms of the velocity, `kappa^3 / 2` in the plane and `H (k1 - k2)^2 / 2` in space with the sum `H` of the principal curvatures, come out too large:
     /// `-sum b t v / 4 tau` with the second moments `v` of the profile.
     pub fn excess(&self) -> f64 {
         let part = |part: &HeatKernel| part.weight * part.time * part.variance;
@@ -97,11 +97,6 @@ impl Kernel {
     /// The heat kernels, by increasing time.
     pub fn heat_kernels(&self) -> &[HeatKernel; 4] {
         &self.parts
-    }
-
-    /// The largest time of its heat kernels.
-    pub fn largest_time(&self) -> f64 {
-        self.parts[3].time
     }
 }
 

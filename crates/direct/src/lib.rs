@@ -6,10 +6,10 @@
 //!
 //! ```math
 //! V = \partial_s^2 \kappa + \tfrac12 \kappa^3 \text{ in the plane}, \qquad
-//! V = \Delta h + \tfrac12 h (k_1 - k_2)^2 \text{ in space},
+//! V = \Delta H + \tfrac12 H (k_1 - k_2)^2 \text{ in space},
 //! ```
 //!
-//! up to terms of second order in $`\tau`$. The step ends with the signed distance to that level ([`geometry::Redistanced`]). `docs/direct.md` has
+//! up to terms of second order in $`\tau`$. The mean curvature $`H`$ is the sum of the principal curvatures $`k_1`$ and $`k_2`$. The step ends with the signed distance to that level ([`geometry::Redistanced`]). `docs/direct.md` has
 //! the theory. Grzhibovskis and Heintz (Interfaces Free Bound. 10, 2008) do the same with indicator functions.
 //!
 //! [`DirectSteps`] makes single steps of first order; [`Direct`] is a [`Scheme`](solver::Scheme) of second order:

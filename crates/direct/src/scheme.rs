@@ -3,19 +3,16 @@
 use std::time::Instant;
 
 use geometry::{
-    Field, Grid, NodeSet, PhaseField, Redistanced, Stored, ZeroSet, distance_from_phase_field,
-    optimal_profile, parallel,
+    Field, Grid, NodeSet, PhaseField, Stored, ZeroSet, distance_from_phase_field, optimal_profile,
+    parallel,
 };
 use serde::{Deserialize, Serialize};
 use solver::{
-    Candidate, DeviceField, DirectRecord, Error, Memory, Problem, Scheme, State, StepRecord,
-    StepSize,
+    Candidate, DirectRecord, Error, Memory, Problem, Scheme, State, StepRecord, StepSize,
 };
 
 use crate::step::{DirectSteps, Needed};
 
-/// Phase fields are made this much wider before their zero level is looked for, so that it is well resolved.
-const WIDER: f64 = 3.0;
 /// Fields and numbers in the memory of a state.
 const WHOLE: &str = "direct whole steps";
 const HALF: &str = "direct half steps";
@@ -48,14 +45,7 @@ impl Default for DirectParams {
 #[derive(Default)]
 pub struct Direct<const D: usize> {
     params: DirectParams,
-    prepared: Option<Prepared<D>>,
-}
-
-/// What is prepared for a grid and an interface width.
-struct Prepared<const D: usize> {
-    grid: Grid<D>,
-    eps: f64,
-    steps: DirectSteps<D>,
+    steps: Option<DirectSteps<D>>,
 }
 
 /// The distances of both runs, and the reach of the interface.
@@ -94,7 +84,7 @@ impl<const D: usize> Direct<D> {
         geometry::positive("longest part of a direct step", params.longest)?;
         Ok(Self {
             params,
-            prepared: None,
+            steps: None,
         })
     }
 
@@ -117,35 +107,18 @@ impl<const D: usize> Direct<D> {
         Err(Error::NotDirect { what })
     }
 
-    fn steps(&mut self, problem: &Problem<D>) -> &mut DirectSteps<D> {
-        let (grid, eps) = (problem.grid, problem.params.eps);
-        let fits = |made: &Prepared<D>| made.grid == grid && made.eps.to_bits() == eps.to_bits();
-        if !self.prepared.as_ref().is_some_and(fits) {
-            self.prepared = None;
-        }
-        let made = self.prepared.get_or_insert_with(|| Prepared {
-            grid,
-            eps,
-            steps: DirectSteps::new(grid),
-        });
-        &mut made.steps
+    /// The steps on a grid, with what is prepared for them.
+    fn steps(&mut self, grid: Grid<D>) -> &mut DirectSteps<D> {
+        self.steps.take_if(|steps| *steps.grid() != grid);
+        self.steps.get_or_insert_with(|| DirectSteps::new(grid))
     }
 }
 
 impl<const D: usize> DirectSteps<D> {
-    /// The distances to the zero level of a function of distances, through a profile that the grid resolves well.
-    fn level(&self, distances: &[f64], eps: f64) -> Redistanced<D> {
-        let wide = |node: usize| -optimal_profile(distances[node], WIDER * eps);
-        self.redistanced(parallel::values(distances.len(), wide))
-    }
-
     /// Both runs at the start of a flow.
     fn start(&self, u: &Stored<D>, eps: f64, free: Free<'_>) -> Runs {
-        let values = u.values();
-        let distances = parallel::values(values.len(), |node| {
-            distance_from_phase_field(values[node], eps)
-        });
-        let made = self.level(&distances, eps);
+        let distances = distances(u.values(), eps);
+        let made = self.level(&distances);
         let reach = made.reach();
         let whole = free.of(made.distances, &distances);
         Runs {
@@ -168,9 +141,7 @@ impl<const D: usize> DirectSteps<D> {
             half: free.of(half.distances, &runs.half),
         }
     }
-}
 
-impl<const D: usize> DirectSteps<D> {
     /// Both runs after a time step, and in how many parts it was made.
     fn advance(&mut self, mut runs: Runs, tau: f64, longest: f64, free: Free<'_>) -> (Runs, usize) {
         let (mut left, mut parts) = (tau, 0);
@@ -192,7 +163,7 @@ impl<const D: usize> DirectSteps<D> {
 }
 
 impl Runs {
-    /// What the runs extrapolate to; pure where either is.
+    /// What the runs extrapolate to; where one has no zero level, the run of half parts.
     fn extrapolated(&self) -> Vec<f64> {
         let (whole, half) = (&self.whole, &self.half);
         parallel::values(whole.len(), |node| {
@@ -206,12 +177,34 @@ impl Runs {
     }
 
     /// The largest distance of the two runs, at nodes within a spacing of the zero level.
-    fn apart(&self, spacing: f64) -> f64 {
+    fn distance(&self, spacing: f64) -> f64 {
         let near = self.half.iter().zip(&self.whole);
         let near = near.filter(|(half, _)| half.abs() <= spacing);
         near.map(|(half, whole)| (half - whole).abs())
             .fold(0.0, f64::max)
     }
+}
+
+/// The distances of a phase field.
+fn distances(values: &[f64], eps: f64) -> Vec<f64> {
+    parallel::values(values.len(), |node| {
+        distance_from_phase_field(values[node], eps)
+    })
+}
+
+/// The phase field of distances.
+fn phase_field<const D: usize>(
+    problem: &Problem<D>,
+    distances: &[f64],
+    free: Free<'_>,
+    fixed: &[f64],
+) -> Result<Stored<D>, geometry::Error> {
+    let eps = problem.params.eps;
+    let values = parallel::values(distances.len(), |node| {
+        optimal_profile(distances[node], eps)
+    });
+    let field = Field::from_values(problem.grid, free.of(values, fixed))?;
+    Ok(Stored::whole(field))
 }
 
 /// The runs that a state remembers.
@@ -220,16 +213,28 @@ fn remembered<const D: usize>(from: &State<D>, eps: f64) -> Result<Option<Runs>,
     let (Some(whole), Some(half)) = (fields.get(WHOLE), fields.get(HALF)) else {
         return Ok(None);
     };
-    let distances = |field: &DeviceField<D>| -> Result<Vec<f64>, Error> {
-        let values = field.stored()?.into_values();
-        let distance = |node: usize| distance_from_phase_field(values[node], eps);
-        Ok(parallel::values(values.len(), distance))
-    };
     Ok(Some(Runs {
-        whole: distances(whole)?,
-        half: distances(half)?,
+        whole: distances(whole.stored()?.values(), eps),
+        half: distances(half.stored()?.values(), eps),
         reach: numbers.get(REACH).copied().unwrap_or(f64::INFINITY),
     }))
+}
+
+/// What a state remembers of runs that end with an energy.
+fn memory<const D: usize>(
+    problem: &Problem<D>,
+    runs: &Runs,
+    energy: f64,
+) -> Result<Memory<D>, geometry::Error> {
+    let mut memory = Memory::default();
+    for (name, distances) in [(WHOLE, &runs.whole), (HALF, &runs.half)] {
+        let field = problem.upload(&phase_field(problem, distances, Free(None), &[])?);
+        memory.fields.insert(name.to_owned(), field);
+    }
+    for (name, number) in [(REACH, runs.reach), (ENERGY, energy)] {
+        memory.numbers.insert(name.to_owned(), number);
+    }
+    Ok(memory)
 }
 
 /// The Willmore energies of the zero level before and after a step; the former may be known.
@@ -256,41 +261,23 @@ impl<const D: usize> Scheme<D> for Direct<D> {
         let (eps, free) = (problem.params.eps, Free(problem.region.as_deref()));
         let longest = self.params.longest;
         let before = from.stored()?;
-        let steps = self.steps(problem);
+        let steps = self.steps(problem.grid);
         let runs = match remembered(from, eps)? {
             Some(runs) => runs,
             None => steps.start(&before, eps, free),
         };
         let (runs, parts) = steps.advance(runs, size.tau, longest, free);
+        let level = steps.level(&runs.extrapolated());
 
-        let stored = |distances: &[f64], free: Free<'_>| -> Result<Stored<D>, Error> {
-            let phase = |node: usize| optimal_profile(distances[node], eps);
-            let values = free.of(parallel::values(distances.len(), phase), before.values());
-            let field = Field::from_values(problem.grid, values);
-            let field = field.map_err(|_| Error::NonFinite {
-                step: from.step + 1,
-                field: "phase field",
-            })?;
-            Ok(Stored::whole(field))
-        };
-        let level = steps.level(&runs.extrapolated(), eps);
-        let now = stored(&level.distances, free)?;
-        let [energy_before, willmore_energy] = energies(from, &before, &now, eps)?;
-        let mut memory = Memory::default();
-        for (name, distances) in [(WHOLE, &runs.whole), (HALF, &runs.half)] {
-            let run = problem.upload(&stored(distances, Free(None))?);
-            memory.fields.insert(name.to_owned(), run);
-        }
-        for (name, number) in [(REACH, runs.reach), (ENERGY, willmore_energy)] {
-            memory.numbers.insert(name.to_owned(), number);
-        }
-        let state = State {
-            field: problem.upload(&now),
+        let not_finite = |_| Error::NonFinite {
             step: from.step + 1,
-            time: from.time + size.tau,
-            progress: from.progress + size.part(),
-            memory,
+            field: "phase field",
         };
+        let now = phase_field(problem, &level.distances, free, before.values());
+        let now = now.map_err(not_finite)?;
+        let [energy_before, willmore_energy] = energies(from, &before, &now, eps)?;
+        let memory = memory(problem, &runs, willmore_energy).map_err(not_finite)?;
+        let state = from.after(size, problem.upload(&now), memory);
         let record = StepRecord {
             step: state.step,
             time: state.time,
@@ -302,7 +289,7 @@ impl<const D: usize> Scheme<D> for Direct<D> {
                 parts,
                 convolutions: 3 * parts,
                 reach: runs.reach,
-                apart: runs.apart(problem.grid.spacing()),
+                run_distance: runs.distance(problem.grid.spacing()),
             }),
             seconds: clock.elapsed().as_secs_f64(),
             ..StepRecord::default()

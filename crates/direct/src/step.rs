@@ -57,19 +57,18 @@ impl<const D: usize> DirectSteps<D> {
         &self.grid
     }
 
-    /// The distances to the zero level of a function, negative where it is.
-    pub fn redistanced(&self, values: Vec<f64>) -> Redistanced<D> {
-        self.redistanced_as(values, Needed::All)
+    /// The distances to the zero level of what is nearly a distance.
+    pub fn level(&self, distances: &[f64]) -> Redistanced<D> {
+        Redistanced::from_distances(self.grid, distances, self.range(Needed::All))
     }
 
-    /// The same as far as distances are needed, and infinite beyond.
-    fn redistanced_as(&self, values: Vec<f64>, needed: Needed) -> Redistanced<D> {
+    fn range(&self, needed: Needed) -> DistanceRange {
         let precise = Profile::PURE * self.grid.spacing();
         let largest = match needed {
             Needed::Near => precise,
             Needed::All => f64::INFINITY,
         };
-        Redistanced::from_values(self.grid, values, DistanceRange { precise, largest })
+        DistanceRange { precise, largest }
     }
 
     /// The size of the shortest step whose kernel the grid resolves.
@@ -120,7 +119,7 @@ impl<const D: usize> DirectSteps<D> {
     }
 
     fn finished_as(&self, values: Vec<f64>, tau: f64, needed: Needed) -> Redistanced<D> {
-        let mut made = self.redistanced_as(values, needed);
+        let mut made = Redistanced::from_values(self.grid, values, self.range(needed));
         let excess = 0.5 * tau * self.kernel(tau).excess();
         let shifts: Vec<f64> = made.points.iter().map(|p| excess * nonlinear(p)).collect();
         let (nearest, distances) = (&made.nearest, &made.distances);
@@ -164,7 +163,7 @@ impl<const D: usize> DirectSteps<D> {
     }
 }
 
-/// `h (k1 - k2)^2`, which is `kappa^3` in the plane.
+/// `H (k1 - k2)^2` with the mean curvature `H`, which is `kappa^3` in the plane.
 fn nonlinear<const D: usize>(point: &LevelPoint<D>) -> f64 {
     let sum = point.mean_curvature();
     sum * (2.0 * point.squared_curvatures() - sum * sum)

@@ -3,7 +3,7 @@
 use direct::{Direct, DirectParams};
 use geometry::exact::willmore_radius;
 use geometry::{
-    DistanceRange, Field, Grid, NodeSet, Redistanced, SignedDistance, distance_from_phase_field,
+    DistanceRange, Field, Grid, NodeSet, Redistanced, SignedDistance, distances_from_phase_field,
     phase_field,
 };
 use model::{MeanCurvatureOperator, Shipped};
@@ -41,12 +41,12 @@ fn flow<const D: usize>(
 
 /// Points of the zero level.
 fn level<const D: usize>(u: &Field<D>, eps: f64) -> Vec<[f64; D]> {
-    let wide = |u: &f64| (0.25 * distance_from_phase_field(*u, 1.0)).tanh();
+    let distances = distances_from_phase_field(u, eps).unwrap().into_values();
     let range = DistanceRange {
         precise: 0.0,
         largest: eps,
     };
-    let made = Redistanced::from_values(*u.grid(), u.values().iter().map(wide).collect(), range);
+    let made = Redistanced::from_distances(*u.grid(), &distances, range);
     made.points.iter().map(|point| point.position).collect()
 }
 
@@ -105,7 +105,7 @@ fn an_ellipse_follows_the_exact_flow_and_its_energy() {
     let distance = exact[1].largest_distance_of(&points);
     // The runs are farther apart than their extrapolation is from the truth.
     assert!(
-        distance < 1e-4 && direct.apart > distance,
+        distance < 1e-4 && direct.run_distance > distance,
         "{distance} {direct:?}"
     );
     assert!((step.willmore_energy / exact[1].energy() - 1.0).abs() < 1e-3);

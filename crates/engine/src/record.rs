@@ -143,7 +143,7 @@ pub(crate) fn to_csv(records: &[Record]) -> String {
     let direct = [
         column("convolutions", |r| Some(r.direct()?.convolutions as f64)),
         column("reach", |r| Some(r.direct()?.reach)),
-        column("apart", |r| Some(r.direct()?.apart)),
+        column("run_distance", |r| Some(r.direct()?.run_distance)),
     ];
     columns.extend(direct.into_iter().filter(is_used));
     columns.extend([

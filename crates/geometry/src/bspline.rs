@@ -4,13 +4,13 @@ use std::array::from_fn;
 
 use crate::{Grid, parallel};
 
-/// Coefficients that a point of an axis sees.
-const REACH: usize = 6;
+/// Coefficients along an axis that a point sees.
+const SUPPORT: usize = 6;
 /// The poles of the inverse of the filter `(1, 26, 66, 26, 1) / 120`, which takes coefficients to values at the nodes (Unser, Aldroubi and Eden, IEEE
 /// Trans. Signal Process. 41, 1993).
 const POLES: [f64; 2] = [-0.430_575_347_099_973_8, -0.043_096_288_203_264_65];
-/// Rows of an axis that are filtered together, side by side in memory.
-const LANES: usize = 16;
+/// Rows in a task.
+const ROWS: usize = 16;
 
 /// The periodic quintic spline through the values of a field at the nodes: four times continuously differentiable, and of sixth order where the field
 /// is smooth.
@@ -32,7 +32,7 @@ pub struct Jet<const D: usize> {
 }
 
 /// Weights of the coefficients around a point of an axis for the value and both derivatives, in spacings of the grid.
-type Weights = [[f64; REACH]; 3];
+type Weights = [[f64; SUPPORT]; 3];
 
 impl<const D: usize> BSpline<D> {
     /// The spline through these values.
@@ -58,7 +58,7 @@ impl<const D: usize> BSpline<D> {
     /// The spline at a point, which may lie outside of the box.
     pub fn at(&self, x: [f64; D]) -> Jet<D> {
         let (cells, h) = (self.grid.cells(), self.grid.spacing());
-        let (mut nodes, mut weights) = ([[0; REACH]; D], [[[0.0; REACH]; 3]; D]);
+        let (mut nodes, mut weights) = ([[0; SUPPORT]; D], [[[0.0; SUPPORT]; 3]; D]);
         for axis in 0..D {
             let position = (x[axis] - self.grid.origin()[axis]) / h;
             let floor = position.floor();
@@ -73,13 +73,13 @@ impl<const D: usize> BSpline<D> {
     }
 
     /// Adds up the rows of coefficients along the last axis around a point.
-    fn sum(&self, nodes: &[[usize; REACH]; D], weights: &[Weights; D], sums: &mut Sums<D>) {
+    fn sum(&self, nodes: &[[usize; SUPPORT]; D], weights: &[Weights; D], sums: &mut Sums<D>) {
         let last = D - 1;
-        for row in 0..REACH.pow(last as u32) {
+        for row in 0..SUPPORT.pow(last as u32) {
             let (mut place, mut rest, mut start) = ([0; D], row, 0);
             for axis in (0..last).rev() {
-                place[axis] = rest % REACH;
-                rest /= REACH;
+                place[axis] = rest % SUPPORT;
+                rest /= SUPPORT;
             }
             for axis in 0..last {
                 start = (start + nodes[axis][place[axis]]) * self.grid.cells();
@@ -162,7 +162,7 @@ fn quintic(t: f64) -> Weights {
         // The slope is odd.
         [value, if x < 0.0 { -slope } else { slope }, bend]
     };
-    let of_nodes: [[f64; 3]; REACH] = from_fn(of_node);
+    let of_nodes: [[f64; 3]; SUPPORT] = from_fn(of_node);
     from_fn(|order| of_nodes.map(|of_node| of_node[order]))
 }
 
@@ -171,7 +171,7 @@ fn filter_along<const D: usize>(grid: &Grid<D>, axis: usize, values: &mut [f64])
     let (cells, stride) = (grid.cells(), grid.stride(axis));
     let block = cells * stride;
     if stride == 1 {
-        parallel::over_chunks(values, block * LANES, &|_, rows| {
+        parallel::over_chunks(values, block * ROWS, &|_, rows| {
             rows.chunks_mut(block).for_each(filter);
         });
         return;

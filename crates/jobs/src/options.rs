@@ -102,7 +102,7 @@ pub enum Stepper {
     /// Minimizations with the learned operator; the energy falls
     #[default]
     Minimizing,
-    /// Convolutions without a minimization: faster and more accurate on smooth shapes, but nothing guarantees that the energy falls
+    /// Convolutions without a minimization: nearer to the exact flow on smooth shapes, but nothing guarantees that the energy falls
     Direct,
 }
 
@@ -292,10 +292,10 @@ pub struct WillmoreOptions {
 
     /// What makes the time steps: minimizing or direct [default: minimizing]
     ///
-    /// minimizing minimizes an energy with the learned operator in each step. direct convolves the signed distance and measures it anew, in as many parts
-    /// of a step as the curvature asks for. Direct steps are of the bending energy alone: they hold no sizes and take no tension, pressure or
-    /// spontaneous curvature. They store the whole grid. The shape should be smooth: a corner costs many short parts. The default of `tau` is
-    /// auto for them.
+    /// minimizing: each step minimizes an energy with the learned operator. direct: each step convolves the signed distance, and then measures the
+    /// distances to the new curve or surface. A direct step is divided into parts, which are short where the curvature is large. Direct steps hold no
+    /// sizes and take no tension, pressure or spontaneous curvature. They store the whole grid. They are for smooth shapes: a corner takes many short
+    /// parts. With them, the default of `tau` is auto.
     #[arg(
         long,
         value_name = "NAME",

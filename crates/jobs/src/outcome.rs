@@ -128,7 +128,7 @@ pub struct DirectReport {
     /// Convolutions of the whole grid.
     pub convolutions: usize,
     /// How far the run of half parts is from that of whole parts at the end: more than the time error of the result, which is extrapolated.
-    pub apart: f64,
+    pub run_distance: f64,
     /// Steps after which the energy was higher than before, which nothing excludes.
     pub energy_increases: usize,
 }
@@ -200,7 +200,7 @@ impl Summary {
     fn of_direct(&self) -> Option<String> {
         let DirectReport {
             convolutions,
-            apart,
+            run_distance,
             energy_increases,
         } = self.direct_steps?;
         let energy = match energy_increases {
@@ -209,7 +209,7 @@ impl Summary {
             some => format!("the energy rose in {some} steps"),
         };
         Some(format!(
-            "{convolutions} convolutions, time error below about {apart:.1e}; {energy}, which direct steps do not guarantee"
+            "{convolutions} convolutions, time error below about {run_distance:.1e}; {energy}: direct steps do not guarantee that it falls"
         ))
     }
 

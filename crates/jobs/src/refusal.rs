@@ -32,7 +32,7 @@ pub enum Refusal {
     Tolerance(Amount),
     /// Controlled steps, of a stepper that estimates no errors of steps.
     #[error(
-        "`tau` controlled is for minimizing steps: give another rule for direct ones, such as auto, or leave out `stepper`"
+        "`tau` controlled is for minimizing steps: with `stepper` direct give another rule, such as auto"
     )]
     ControlledDirect,
     /// A ramp of so many steps, but no size that goes to a target.

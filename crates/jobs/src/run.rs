@@ -468,7 +468,7 @@ fn direct_report(records: &[Record]) -> Option<DirectReport> {
     let last = steps.clone().next_back()?;
     Some(DirectReport {
         convolutions: steps.map(|step| step.convolutions).sum(),
-        apart: last.apart,
+        run_distance: last.run_distance,
         energy_increases: energy_increases(records),
     })
 }

@@ -107,7 +107,7 @@ const COLUMNS: [(&str, &str); 12] = [
     ("displacement", "root mean square displacement"),
     ("convolutions", "convolutions"),
     ("reach", "reach of the interface"),
-    ("apart", "distance of the two runs"),
+    ("run_distance", "distance of the two runs"),
     ("newton", "Newton steps"),
     ("hvp", "Hessian products"),
     ("halvings", "times shortened"),
@@ -285,7 +285,7 @@ const REST: [(&str, &str); 14] = [
         "Convolutions of the whole grid",
     ),
     (
-        "/direct_steps/apart",
+        "/direct_steps/run_distance",
         "Distance of the runs of whole and of half parts at the end, more than the error of the time steps, in units of the input",
     ),
     (

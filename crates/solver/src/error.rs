@@ -70,9 +70,7 @@ pub enum Error {
     NoInterface,
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
-    #[error(
-        "direct steps are of the bending energy alone on the whole grid, without {what}; use minimizing steps"
-    )]
+    #[error("direct steps do not take {what}: use minimizing steps")]
     NotDirect { what: &'static str },
     /// What a step of mean curvature flow refuses: a grid, scales, bricks.
     #[error("{0}")]

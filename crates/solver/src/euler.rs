@@ -62,7 +62,7 @@ impl<const D: usize> Euler<D> {
             .fields
             .insert(PREVIOUS.to_owned(), from.field.clone());
         memory.numbers.insert(PREVIOUS_TAU.to_owned(), size.tau);
-        let state = at.after(minimum.u, memory);
+        let state = from.after(size, minimum.u, memory);
         Ok(Candidate {
             state,
             tau: size.tau,

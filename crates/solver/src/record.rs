@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::movement::Minimum;
 use crate::newton::NewtonInfo;
 use crate::times::PhaseTimes;
-use crate::{DeviceField, Memory, State, StepEstimates, StepSize};
+use crate::{State, StepEstimates, StepSize};
 
 /// The origin of a start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,9 +40,9 @@ pub struct DirectRecord {
     pub convolutions: usize,
     /// The reach of the interface at its end: the largest radius of balls that touch it wherever they lie on it.
     pub reach: f64,
-    /// How far the run of whole parts is from the run of half parts: about the time error of the latter, and more than that of the result, which is
-    /// extrapolated from both.
-    pub apart: f64,
+    /// The distance of the runs of whole and of half parts: about the time error of the latter, and more than that of the result, which is extrapolated
+    /// from both.
+    pub run_distance: f64,
 }
 
 /// One time step of Willmore flow.
@@ -110,19 +110,6 @@ impl StepRecord {
 pub(crate) struct At<'a, const D: usize> {
     pub(crate) from: &'a State<D>,
     pub(crate) size: StepSize,
-}
-
-impl<const D: usize> At<'_, D> {
-    /// The state after the step.
-    pub(crate) fn after(&self, field: DeviceField<D>, memory: Memory<D>) -> State<D> {
-        State {
-            field,
-            step: self.from.step + 1,
-            time: self.from.time + self.size.tau,
-            progress: self.from.progress + self.size.part(),
-            memory,
-        }
-    }
 }
 
 impl<const D: usize> Minimum<D> {

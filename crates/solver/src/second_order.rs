@@ -147,7 +147,7 @@ impl<const D: usize> Scheme<D> for SecondOrder<D> {
         let rate = DeviceField::upload(&rate, &problem.device);
         memory.fields.insert(RATE.to_owned(), rate);
         Ok(Candidate {
-            state: At { from: &from, size }.after(second.u, memory),
+            state: from.after(size, second.u, memory),
             tau: size.tau,
             record: Some(record),
         })

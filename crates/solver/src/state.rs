@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 use geometry::{Field, Nodes, PhaseField, Stored};
 use operators::ComputeDevice;
 
-use crate::Error;
+use crate::{Error, StepSize};
 
 /// A field on a device: its values at [nodes](Nodes), on the whole grid or on bricks, and the constants that it has elsewhere.
 #[derive(Clone, Debug)]
@@ -134,6 +134,18 @@ impl<const D: usize> State<D> {
             time: 0.0,
             progress: 0.0,
             memory: Memory::default(),
+        }
+    }
+
+    /// The state after a step of this size, with the phase field there and what the scheme remembers.
+    #[must_use]
+    pub fn after(&self, size: StepSize, field: DeviceField<D>, memory: Memory<D>) -> Self {
+        Self {
+            field,
+            step: self.step + 1,
+            time: self.time + size.tau,
+            progress: self.progress + size.part(),
+            memory,
         }
     }
 

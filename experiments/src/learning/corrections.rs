@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use chacha20::ChaCha8Rng;
 use direct::{DirectSteps, HeatKernel};
-use geometry::{LevelPoint, Redistanced, parallel};
+use geometry::{LevelPoint, Redistanced};
 use rand::{RngExt, SeedableRng};
 
 use crate::prelude::libraries::*;
@@ -256,14 +256,6 @@ impl Correction {
         }
         Ok(distances)
     }
-}
-
-/// The zero level of distances.
-pub fn level(steps: &DirectSteps<2>, distances: &[f64]) -> Redistanced<2> {
-    const WIDTH: f64 = 6.0;
-    let width = WIDTH * steps.grid().spacing();
-    let value = |node: usize| (distances[node] / width).tanh();
-    steps.redistanced(parallel::values(distances.len(), value))
 }
 
 #[cfg(test)]

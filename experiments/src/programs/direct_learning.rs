@@ -1,6 +1,6 @@
 use crate::learning::{
     AdamParams, Correction, Curves, Example, Form, Pair, Taught, energy_of_exact_steps,
-    from_energy, from_pairs, level,
+    from_energy, from_pairs,
 };
 use crate::prelude::*;
 use direct::DirectSteps;
@@ -532,7 +532,7 @@ fn rollouts(
             )?;
             let grid = DirectSteps::new(example.grid);
             let point = |(k, (state, exact)): (usize, (&Vec<f64>, &Curve))| {
-                let points = level(&grid, state).points;
+                let points = grid.level(state).points;
                 let points: Vec<[f64; 2]> = points.iter().map(|point| point.position).collect();
                 let distance = exact.largest_distance_of(&points) * example.curvature;
                 [((k + 1) * every) as f64, distance]

@@ -1,5 +1,5 @@
 use direct::DirectParams;
-use geometry::{DistanceRange, Redistanced, profile_variable};
+use geometry::{DistanceRange, Redistanced, distance_from_phase_field};
 use rand::{RngExt, SeedableRng};
 use reference::{Curve, Shape, planar, revolution};
 
@@ -467,14 +467,15 @@ fn distance(exact: &Curve, field: &Field<2>) -> f64 {
     exact.largest_distance_of(&level(field))
 }
 
-/// Points of the zero level of a phase field, by a spline through a wider profile: to sixth order.
+/// Points of the zero level of a phase field of two cells to `eps`, to sixth order.
 fn level<const D: usize>(field: &Field<D>) -> Vec<[f64; D]> {
-    let wide = field.map(|u| (profile_variable(u) / 3.0).tanh());
+    let grid = *field.grid();
+    let distance = |u| distance_from_phase_field(u, 2.0 * grid.spacing());
     let range = DistanceRange {
         precise: 0.0,
-        largest: field.grid().spacing(),
+        largest: grid.spacing(),
     };
-    let made = Redistanced::from_values(*field.grid(), wide.into_values(), range);
+    let made = Redistanced::from_distances(grid, field.map(distance).values(), range);
     made.points.iter().map(|point| point.position).collect()
 }
 
