@@ -84,7 +84,7 @@ pub use error::{Error, positive, require};
 pub use field::Field;
 pub use grid::Grid;
 pub use node_set::NodeSet;
-pub use nodes::{Lookup, Nodes, PhaseField, check_values};
+pub use nodes::{Lookup, Nodes, PhaseField, Row, check_values};
 pub use placement::Placement;
 pub use profile::{
     PURE_BEYOND, distance_from_phase_field, distances_from_phase_field, optimal_profile,

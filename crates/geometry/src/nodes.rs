@@ -69,6 +69,27 @@ impl<const D: usize> Nodes<D> {
             .map_or_else(|| self.grid.len(), |bricks| bricks.len())
     }
 
+    /// How many nodes a [row](Self::row) has: all numbers of nodes are multiples of it.
+    pub fn row_length(&self) -> usize {
+        (self.bricks.as_ref()).map_or_else(|| self.grid.cells(), |bricks| bricks.side())
+    }
+
+    /// The row that begins at this node, whose number is a multiple of [their length](Self::row_length).
+    pub fn row(&self, first: usize) -> Row<D> {
+        let length = self.row_length();
+        let place = self.multi_index(first);
+        let mut beside = std::array::from_fn(|axis| self.along(first, place, axis, [-1, 1]));
+        let (last, mut end) = (first + length - 1, place);
+        end[D - 1] += length - 1;
+        [beside[D - 1][1]] = self.along(last, end, D - 1, [1]);
+        Row {
+            first,
+            length,
+            place,
+            beside,
+        }
+    }
+
     /// The multi-index of a node in the grid.
     pub fn multi_index(&self, node: usize) -> [usize; D] {
         match &self.bricks {
@@ -116,6 +137,45 @@ impl<const D: usize> Nodes<D> {
     /// How many nodes of the negative and of the positive phase are not stored.
     pub(crate) fn outside(&self) -> [usize; 2] {
         (self.bricks.as_ref()).map_or([0; 2], |bricks| bricks.outside())
+    }
+}
+
+/// Nodes along the last axis that lie side by side in storage: what lies beside them is looked up for all of them at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<const D: usize> {
+    /// The number of the first node.
+    pub first: usize,
+    /// How many there are.
+    pub length: usize,
+    /// The multi-index of the first node in the grid.
+    pub place: [usize; D],
+    /// What lies before and after the first node along each axis; along the last one, after the last node.
+    beside: [[Lookup; 2]; D],
+}
+
+impl<const D: usize> Row<D> {
+    /// What lies before and after the node at a position in the row, along an axis. Where nothing is stored beside one node, there is nothing beside the
+    /// others, unless it is the last axis.
+    #[expect(clippy::inline_always, reason = "what it returns stays in registers")]
+    #[inline(always)]
+    pub fn beside(&self, at: usize, axis: usize) -> [Lookup; 2] {
+        let mut beside = self.beside[axis];
+        if axis < D - 1 {
+            for found in &mut beside {
+                if let Lookup::Stored(node) = found {
+                    *node += at;
+                }
+            }
+        } else {
+            let node = self.first + at;
+            if at > 0 {
+                beside[0] = Lookup::Stored(node - 1);
+            }
+            if at + 1 < self.length {
+                beside[1] = Lookup::Stored(node + 1);
+            }
+        }
+        beside
     }
 }
 
@@ -234,6 +294,19 @@ mod tests {
         );
         let inside = dense.iter().filter(|x| x.to_bits() == 1.0_f64.to_bits());
         assert_eq!(stored.outside()[1], inside.count());
+        for nodes in [&stored, &whole] {
+            for first in (0..nodes.len()).step_by(nodes.row_length()) {
+                let row = nodes.row(first);
+                for (at, axis) in (0..row.length).flat_map(|at| [(at, 0), (at, 1)]) {
+                    let node = first + at;
+                    let place = nodes.multi_index(node);
+                    assert_eq!(
+                        row.beside(at, axis),
+                        nodes.along(node, place, axis, [-1, 1])
+                    );
+                }
+            }
+        }
         for (node, value) in x.iter().enumerate() {
             let place = stored.multi_index(node);
             let on_grid = grid.index(place);

@@ -161,18 +161,26 @@ impl<T: Real> Pass<'_, T> {
         [neighbour(0), own, neighbour(1)]
     }
 
-    /// Along an axis that is not the last: `COLUMNS` registers of lines at once, which lie side by side in memory.
+    /// Along an axis that is not the last: `COLUMNS` registers of lines at once. `SIDE` is the side of a brick, or 0 if it is not known when this is
+    /// compiled.
     #[inline(always)]
-    fn across<S: Simd, const COLUMNS: usize>(&self, simd: S, bricks: [&[T]; 3], result: &mut [T]) {
-        let (side, reach) = (self.side, self.reach);
+    fn across<S: Simd, const SIDE: usize, const COLUMNS: usize>(
+        &self,
+        simd: S,
+        bricks: [&[T]; 3],
+        result: &mut [T],
+    ) {
+        let (side, reach) = (self.side::<SIDE>(), self.reach);
         let [before, own, after] = bricks.map(T::registers::<S>);
+        let lanes = size_of::<T::Register<S>>() / size_of::<T>();
         let result = T::registers_mut::<S>(result);
-        let stride = self.stride * result.len() / self.volume;
+        let stride = self.stride / lanes;
         for column in (0..result.len() / side).step_by(COLUMNS) {
             let starts: [usize; COLUMNS] = std::array::from_fn(|c| {
                 let column = column + c;
                 column / stride * stride * side + column % stride
             });
+            let last = (side - 1) * stride;
             for first in (0..side).step_by(ROWS) {
                 // The cells from `first - reach` to `first + ROWS - 1 + reach`, brick by brick.
                 let end = first + ROWS + reach;
@@ -184,8 +192,9 @@ impl<T: Real> Pass<'_, T> {
                 let mut sums = [[T::splat(simd, T::zero()); COLUMNS]; ROWS];
                 let mut windows = self.weights.windows(ROWS);
                 for (brick, cells) in parts {
+                    let lines = starts.map(|start| &brick[start..][..=last]);
                     for (at, window) in cells.zip(&mut windows) {
-                        let values = starts.map(|start| brick[start + at * stride]);
+                        let values = lines.map(|line| line[at * stride]);
                         for (sums, weight) in sums.iter_mut().zip(window.iter().rev()) {
                             let weight = T::splat(simd, *weight);
                             for (sum, value) in sums.iter_mut().zip(values) {
@@ -194,9 +203,10 @@ impl<T: Real> Pass<'_, T> {
                         }
                     }
                 }
-                for (q, sums) in sums.iter().enumerate() {
-                    for (start, sum) in starts.iter().zip(sums) {
-                        result[start + (first + q) * stride] = *sum;
+                for (c, start) in starts.into_iter().enumerate() {
+                    let line = &mut result[start + first * stride..][..=(ROWS - 1) * stride];
+                    for (q, sums) in sums.iter().enumerate() {
+                        line[q * stride] = sums[c];
                     }
                 }
             }
@@ -205,43 +215,50 @@ impl<T: Real> Pass<'_, T> {
 
     /// Along the last axis: from copies of the lines with what lies before and after them.
     #[inline(always)]
-    fn along<S: Simd>(
+    fn along<S: Simd, const SIDE: usize>(
         &self,
         simd: S,
-        [before, own, after]: [&[T]; 3],
-        copies: &mut Vec<T>,
+        bricks: [&[T]; 3],
+        copies: &mut [T],
         result: &mut [T],
     ) {
-        let (side, reach) = (self.side, self.reach);
+        let (side, reach) = (self.side::<SIDE>(), self.reach);
         let taps = &self.weights[ROWS - 1..][..=2 * reach];
-        let lanes = self.volume / T::registers::<S>(own).len();
+        let lanes = size_of::<T::Register<S>>() / size_of::<T>();
         let width = 3 * side;
-        copies.resize(LINES * width, T::zero());
-        for block in (0..self.volume).step_by(LINES * side) {
-            for (part, brick) in [before, own, after].into_iter().enumerate() {
-                let lines = brick[block..][..LINES * side].chunks_exact(side);
-                for (line, copy) in lines.zip(copies.chunks_exact_mut(width)) {
-                    let copy = T::registers_mut::<S>(&mut copy[part * side..][..side]);
-                    for (to, from) in copy.iter_mut().zip(T::registers::<S>(line)) {
-                        *to = *from;
-                    }
+        let copies = &mut copies[..LINES * width];
+        for (block, result) in result.chunks_exact_mut(LINES * side).enumerate() {
+            let block = block * LINES * side;
+            for (part, brick) in bricks.into_iter().enumerate() {
+                let brick = &brick[block..][..LINES * side];
+                for line in 0..LINES {
+                    let copy = &mut copies[line * width + part * side..][..side];
+                    copy.copy_from_slice(&brick[line * side..][..side]);
                 }
             }
             for first in (0..side).step_by(lanes) {
                 let mut sums = [T::splat(simd, T::zero()); LINES];
+                let windows =
+                    &copies[side - reach + first..][..(LINES - 1) * width + 2 * reach + lanes];
                 for (k, tap) in taps.iter().enumerate() {
                     let tap = T::splat(simd, *tap);
+                    let windows = &windows[k..][..(LINES - 1) * width + lanes];
                     for (line, sum) in sums.iter_mut().enumerate() {
-                        let values = &copies[line * width + side - reach + first + k..][..lanes];
-                        *sum = T::multiply_add(simd, tap, T::registers::<S>(values)[0], *sum);
+                        let values = T::registers::<S>(&windows[line * width..][..lanes]);
+                        *sum = T::multiply_add(simd, tap, values[0], *sum);
                     }
                 }
                 for (line, sum) in sums.iter().enumerate() {
-                    let result = &mut result[block + line * side + first..][..lanes];
-                    T::registers_mut::<S>(result)[0] = *sum;
+                    T::registers_mut::<S>(&mut result[line * side + first..][..lanes])[0] = *sum;
                 }
             }
         }
+    }
+
+    /// The side of a brick.
+    #[inline(always)]
+    fn side<const SIDE: usize>(&self) -> usize {
+        if SIDE > 0 { SIDE } else { self.side }
     }
 }
 
@@ -252,23 +269,35 @@ struct Group<'a, T> {
     result: &'a mut [T],
 }
 
+impl<T: Real> Group<'_, T> {
+    #[inline(always)]
+    fn run<S: Simd, const SIDE: usize>(self, simd: S) {
+        let pass = self.pass;
+        let mut copies = vec![T::zero(); LINES * 3 * pass.side];
+        for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
+            let bricks = pass.bricks(self.first + i);
+            let columns = T::registers::<S>(bricks[0]).len() / pass.side;
+            if pass.stride == 1 {
+                pass.along::<S, SIDE>(simd, bricks, &mut copies, result);
+            } else if columns.is_multiple_of(2) {
+                pass.across::<S, SIDE, 2>(simd, bricks, result);
+            } else {
+                pass.across::<S, SIDE, 1>(simd, bricks, result);
+            }
+        }
+    }
+}
+
 impl<T: Real> WithSimd for Group<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let pass = self.pass;
-        let mut copies = Vec::new();
-        for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
-            let bricks = pass.bricks(self.first + i);
-            let columns = T::registers::<S>(bricks[0]).len() / pass.side;
-            if pass.stride == 1 {
-                pass.along(simd, bricks, &mut copies, result);
-            } else if columns.is_multiple_of(2) {
-                pass.across::<S, 2>(simd, bricks, result);
-            } else {
-                pass.across::<S, 1>(simd, bricks, result);
-            }
+        // The usual sides are compiled for themselves.
+        match self.pass.side {
+            8 => self.run::<S, 8>(simd),
+            16 => self.run::<S, 16>(simd),
+            _ => self.run::<S, 0>(simd),
         }
     }
 }

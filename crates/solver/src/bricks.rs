@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Bricks, Lookup, Nodes, PhaseField, Stored, parallel};
+use geometry::{Bricks, Lookup, Nodes, PhaseField, Row, Stored, parallel};
 
 use crate::{DeviceField, Error};
 
@@ -119,11 +119,14 @@ fn reached<const D: usize>(
     };
     let reached = parallel::map(holders.len(), 1, &|holder| -> Vec<usize> {
         let (cells, place) = (&cells_of[holders[holder]], bricks.place(holders[holder]));
+        let bounds = bounds(cells);
+        let within =
+            |cells: [[i64; D]; 2], offset| distance(cells, offset, side as i64) <= reach * reach;
         (0..offsets.pow(D as u32))
             .map(offset)
-            .filter(|offset| {
+            .filter(|&offset| {
                 let mut cells = cells.iter();
-                cells.any(|cell| distance(*cell, *offset, side as i64) <= reach * reach)
+                within(bounds, offset) && cells.any(|&cell| within([cell; 2], offset))
             })
             .map(|offset| {
                 bricks.flat(std::array::from_fn(|axis| {
@@ -139,11 +142,20 @@ fn reached<const D: usize>(
     near
 }
 
-/// The square of the distance of a cell to the nearest one of the brick that is so many bricks away.
-fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 {
+/// The least and the greatest place along each axis of some cells.
+fn bounds<const D: usize>(cells: &[[i64; D]]) -> [[i64; D]; 2] {
+    let along = |axis: usize| cells.iter().map(move |cell| cell[axis]);
+    [
+        std::array::from_fn(|axis| along(axis).min().unwrap_or_default()),
+        std::array::from_fn(|axis| along(axis).max().unwrap_or_default()),
+    ]
+}
+
+/// The square of the distance between the cells from the least to the greatest of these places and the brick that is so many bricks away.
+fn distance<const D: usize>([least, greatest]: [[i64; D]; 2], offset: [i64; D], side: i64) -> f64 {
     let squares = (0..D).map(|axis| {
         let first = offset[axis] * side;
-        let gap = (first - cell[axis]).max(cell[axis] - (first + side - 1));
+        let gap = (first - greatest[axis]).max(least[axis] - (first + side - 1));
         gap.max(0).pow(2)
     });
     squares.sum::<i64>() as f64
@@ -151,25 +163,73 @@ fn distance<const D: usize>(cell: [i64; D], offset: [i64; D], side: i64) -> f64 
 
 /// The places of the nodes beside which `u` changes its sign.
 fn interface<const D: usize>(nodes: &Nodes<D>, u: &[f64]) -> Vec<[usize; D]> {
-    let changes_beside = |node: usize| {
-        let place = nodes.multi_index(node);
-        let positive = u[node] > 0.0;
-        let changes = (0..D).any(|axis| {
-            let beside = nodes.along(node, place, axis, [-1, 1]);
-            beside.into_iter().any(|beside| match beside {
-                Lookup::Stored(node) => positive != (u[node] > 0.0),
-                Lookup::Pure { positive: beside } => positive != beside,
-            })
-        });
-        changes.then_some(place)
-    };
+    let (length, share) = (nodes.row_length(), CHUNK / nodes.row_length());
     let Some(bricks) = nodes.bricks() else {
-        return parallel::filter_map(u.len(), CHUNK, &changes_beside);
+        let rows = parallel::map(u.len() / length, share, &|row| {
+            changes_in_row(nodes, u, row * length)
+        });
+        return rows.concat();
     };
     let (volume, mixed) = (bricks.volume(), mixed_bricks(bricks, u));
-    parallel::filter_map(mixed.len() * volume, CHUNK, &|index| {
-        changes_beside(mixed[index / volume] * volume + index % volume)
-    })
+    let found = parallel::map(mixed.len(), 1, &|number| -> Vec<[usize; D]> {
+        let first = mixed[number] * volume;
+        let rows = (first..first + volume).step_by(length);
+        rows.flat_map(|first| changes_in_row(nodes, u, first))
+            .collect()
+    });
+    found.concat()
+}
+
+/// The places in the row from `first` on beside which `u` changes its sign.
+fn changes_in_row<const D: usize>(nodes: &Nodes<D>, u: &[f64], first: usize) -> Vec<[usize; D]> {
+    let row = nodes.row(first);
+    let mut changes = vec![false; row.length];
+    mark_changes(&row, u, &mut changes);
+    let changed = changes.iter().enumerate().filter(|(_, changes)| **changes);
+    changed
+        .map(|(at, _)| {
+            let mut place = row.place;
+            place[D - 1] += at;
+            place
+        })
+        .collect()
+}
+
+/// Marks the nodes of a row beside which `u` changes its sign.
+fn mark_changes<const D: usize>(row: &Row<D>, u: &[f64], changes: &mut [bool]) {
+    let (last, values) = (row.length - 1, &u[row.first..][..row.length]);
+    for axis in 0..D - 1 {
+        for beside in row.beside(0, axis) {
+            match beside {
+                Lookup::Stored(first) => mark(changes, values, &u[first..][..row.length]),
+                Lookup::Pure { positive } => {
+                    let own = changes.iter_mut().zip(values);
+                    own.for_each(|(changes, own)| *changes |= (*own > 0.0) != positive);
+                }
+            }
+        }
+    }
+    mark(&mut changes[1..], &values[1..], values);
+    mark(&mut changes[..last], values, &values[1..]);
+    let ends = [row.beside(0, D - 1)[0], row.beside(last, D - 1)[1]];
+    for (at, beside) in [0, last].into_iter().zip(ends) {
+        changes[at] |= (values[at] > 0.0) != is_positive(u, beside);
+    }
+}
+
+/// Marks where the signs of two rows differ.
+fn mark(changes: &mut [bool], own: &[f64], beside: &[f64]) {
+    for ((changes, own), beside) in changes.iter_mut().zip(own).zip(beside) {
+        *changes |= (*own > 0.0) != (*beside > 0.0);
+    }
+}
+
+/// Whether `u` is positive there.
+fn is_positive(u: &[f64], found: Lookup) -> bool {
+    match found {
+        Lookup::Stored(node) => u[node] > 0.0,
+        Lookup::Pure { positive } => positive,
+    }
 }
 
 /// The numbers of the bricks that hold nodes beside which `u` may change its sign: those of one sign with others of that sign around them do not.

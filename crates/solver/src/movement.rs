@@ -6,6 +6,7 @@ use burn::tensor::Tensor;
 use geometry::{NodeSet, Nodes};
 
 use crate::bounds::{Active, BoundsOn};
+use crate::cg::dot;
 use crate::constraints::{Constraints, Restoring};
 use crate::newton::{NewtonInfo, Restrictions, minimize_timed};
 use crate::preconditioner::Preconditioner;
@@ -194,7 +195,8 @@ impl<const D: usize> Minimizations<D> {
                 tolerance: params.newton.tolerance,
             });
         }
-        if !device.values(u.clone())?.iter().all(|u| u.is_finite()) {
+        // Far from overflow, the sum of their squares is finite if the values are.
+        if !dot(&u, &u, device)?.is_finite() {
             return Err(Error::non_finite(step, "phase field"));
         }
         let fidelity = movement.fidelity(&*inner, &u)?;

@@ -1,6 +1,6 @@
 //! The grid nodes of an interface, with their foot points on it, in the cells of a coarse lattice.
 
-use geometry::{Grid, Nodes, parallel};
+use geometry::{Grid, Nodes, Row, parallel};
 use operators::Interpolation;
 
 /// Corners of a cell of the lattice in 3D; in 2D the first four count.
@@ -113,10 +113,7 @@ impl<const D: usize> Samples<D> {
                 }
             }),
         };
-        let mut samples: Vec<Sample<D>> = parallel::filter_map(u.len(), CHUNK, &|node| {
-            let moves = region.is_none_or(|region| region[node]);
-            moves.then(|| lattice.sample(node, nodes, u)).flatten()
-        });
+        let mut samples = lattice.samples(nodes, u, region);
         let mut cell_of = vec![u32::MAX; lattice.points.len()];
         let mut column_of = cell_of.clone();
         let mut corners: Vec<[u32; MOST_CORNERS]> = Vec::new();
@@ -211,6 +208,35 @@ fn distance(u: f64, eps: f64) -> f64 {
 }
 
 impl<const D: usize> Lattice<'_, D> {
+    /// The samples of the nodes that may move, in the order of storage.
+    fn samples(&self, nodes: &Nodes<D>, u: &[f64], region: Option<&[bool]>) -> Vec<Sample<D>> {
+        let length = nodes.row_length();
+        let share = CHUNK.next_multiple_of(length);
+        let chunks = parallel::map(u.len().div_ceil(share), 1, &|chunk| {
+            let end = u.len().min((chunk + 1) * share);
+            let mut samples = Vec::new();
+            for first in (chunk * share..end).step_by(length) {
+                let near = u[first..][..length].iter().any(|&u| self.is_near(u));
+                let row = near.then(|| nodes.row(first));
+                for (row, at) in row
+                    .iter()
+                    .flat_map(|row| (0..length).map(move |at| (row, at)))
+                {
+                    if region.is_none_or(|region| region[first + at]) {
+                        samples.extend(self.sample(row, at, u));
+                    }
+                }
+            }
+            samples
+        });
+        chunks.into_iter().flatten().collect()
+    }
+
+    /// Whether a node with this value belongs to the interface.
+    fn is_near(&self, u: f64) -> bool {
+        1.0 - u * u >= self.window
+    }
+
     fn distance(&self, node: usize, u: &[f64]) -> f64 {
         let known = self.distances[node];
         if known.is_nan() {
@@ -220,19 +246,21 @@ impl<const D: usize> Lattice<'_, D> {
         }
     }
 
-    /// The sample of a node, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole lattice.
-    fn sample(&self, node: usize, nodes: &Nodes<D>, u: &[f64]) -> Option<Sample<D>> {
-        let weight = 1.0 - u[node] * u[node];
-        if weight < self.window {
+    /// The sample of a node at a position in a row, if the node belongs to the interface, with all nodes beside it. Its cell is still that of the whole
+    /// lattice.
+    fn sample(&self, row: &Row<D>, position: usize, u: &[f64]) -> Option<Sample<D>> {
+        let node = row.first + position;
+        if !self.is_near(u[node]) {
             return None;
         }
         let spacing = self.grid.spacing();
-        let index = nodes.multi_index(node);
+        let mut index = row.place;
+        index[D - 1] += position;
         let here = self.distance(node, u);
         let mut laplacian = 0.0;
         let mut normal = [0.0; D];
         for (axis, normal) in normal.iter_mut().enumerate() {
-            let [before, after] = nodes.along(node, index, axis, [-1, 1]);
+            let [before, after] = row.beside(position, axis);
             let at = |node: usize| self.distance(node, u);
             let (after, before) = (at(after.stored()?), at(before.stored()?));
             laplacian += after - 2.0 * here + before;
@@ -256,7 +284,7 @@ impl<const D: usize> Lattice<'_, D> {
             cell: self.points.index(low) as u32,
             fraction: foot.map(|x| x - x.floor()),
             normal,
-            weight,
+            weight: 1.0 - u[node] * u[node],
             // For a distance function the Laplacian is the mean curvature.
             curvature: laplacian / (spacing * spacing),
         })
