@@ -11,7 +11,7 @@ const FOLDER_VARIABLE: &str = "WORKBENCH_MESHES";
 /// Options of programs that start from a mesh.
 #[derive(Args, Clone, Debug, Default)]
 pub struct MeshOptions {
-    /// Start from this mesh (OBJ, STL or PLY) [default: that of the paper, from the folder named by WORKBENCH_MESHES or from
+    /// Start from this mesh (OBJ, OFF, STL or PLY) [default: that of the paper, from the folder named by WORKBENCH_MESHES or from
     /// meshes/, where scripts/fetch_meshes puts it]
     #[arg(long, value_name = "FILE", conflicts_with = "procedural")]
     pub mesh: Option<PathBuf>,

@@ -66,7 +66,7 @@ class Shaped:
         return image_of(self._shape, self._source)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the mesh (.ply, .obj, .stl) or the drawing (.png, .svg).
+        """Writes the mesh (.ply, .obj, .stl, .off) or the drawing (.png, .svg).
 
         Parameters
         ----------

@@ -166,7 +166,7 @@ class Run:
     @property
     def mesh(self) -> _meshes.Arrays | None:
         """The surface at the end; None for a curve."""
-        for ending in ("ply", "obj", "stl"):
+        for ending in ("ply", "obj", "stl", "off"):
             path = self.folder / f"final.{ending}"
             if path.exists():
                 vertices, faces = _willmore.read_mesh(os.fspath(path))

@@ -70,7 +70,8 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli> {
         let opened = File::open(file).map(|opened| opened.take(LONGEST as u64 + 1));
         let read = opened.and_then(|mut opened| opened.read_to_string(&mut text));
         read.map_err(files::Error::of("read", file))?;
-        return parse_both(arguments, command, typed, &text, file);
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        return parse_both(arguments, command, typed, text, file);
     }
     Ok(Cli::from_arg_matches(&matches)?)
 }

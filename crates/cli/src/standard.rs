@@ -103,9 +103,14 @@ fn paths(command: &mut Command) -> Option<(&mut InputOptions, Option<&mut PathBu
 
 /// The usual extension of a file with these contents: OBJ, which is any text, if they are nothing else.
 fn kind(bytes: &[u8]) -> &'static str {
-    const BEGINNINGS: [(&[u8], &str); 21] = [
+    const BEGINNINGS: [(&[u8], &str); 26] = [
         (b"ply", "ply"),
         (b"solid", "stl"),
+        (b"OFF", "off"),
+        (b"COFF", "off"),
+        (b"NOFF", "off"),
+        (b"CNOFF", "off"),
+        (b"STOFF", "off"),
         (b"\x89PNG", "png"),
         (b"\xff\xd8", "jpg"),
         (b"GIF8", "gif"),
@@ -126,17 +131,16 @@ fn kind(bytes: &[u8]) -> &'static str {
         (b"<?xml", "vti"),
         (b"<VTKFile", "vti"),
     ];
-    // A header of 80 bytes, the number of triangles, and 50 bytes for each of them.
-    let facets = bytes.get(80..84).and_then(|count| count.try_into().ok());
-    let length = facets.map(|count| 84 + 50 * u64::from(u32::from_le_bytes(count)));
-    if length == Some(bytes.len() as u64) {
-        return "stl";
-    }
     if bytes.get(208..212) == Some(b"MAP ") {
         return "mrc";
     }
+    let text = files::without_mark(bytes);
     let known = BEGINNINGS
         .iter()
-        .find(|(beginning, _)| bytes.starts_with(beginning));
-    known.map_or("obj", |(_, kind)| kind)
+        .find(|(beginning, _)| text.starts_with(beginning));
+    match known {
+        Some((_, kind)) => kind,
+        None if surfaces::is_binary_stl(bytes) => "stl",
+        None => "obj",
+    }
 }

@@ -192,6 +192,7 @@ fn meshes_and_pictures_go_through_pipes() {
     for (shape, file) in [
         ("sphere", "in.ply"),
         ("sphere", "in.stl"),
+        ("sphere", "in.off"),
         ("disc", "in.png"),
     ] {
         let shape = format!("builtin:{shape}");

@@ -33,4 +33,4 @@ pub use checksum::{Sha256, hexadecimal};
 pub use error::Error;
 pub use file_system::{Disk, FileSystem};
 pub use number::Number;
-pub use text::{shortened, with_causes};
+pub use text::{UTF8_MARK, shortened, with_causes, without_mark};

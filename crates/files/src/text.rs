@@ -2,6 +2,14 @@
 
 use std::error::Error;
 
+/// The byte order mark of UTF-8, with which a file of text may begin.
+pub const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The bytes behind the [mark](UTF8_MARK), if they begin with it.
+pub fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes)
+}
+
 /// The start of a text, in one line without control characters, for the message that complains of
 /// it: `longest` characters, and ` ...` if there is more.
 ///

@@ -25,7 +25,7 @@ pub enum Error {
     ParaView(String),
     /// Something that no job takes.
     #[error(
-        "{0} is no input: give a mesh (.obj, .stl, .ply), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume (.nii, .nii.gz, .nrrd, .nhdr, \
+        "{0} is no input: give a mesh (.obj, .stl, .ply, .off), an image (.png, .jpg, .webp, .gif, .tif, .bmp), a volume (.nii, .nii.gz, .nrrd, .nhdr, \
          .mgh, .mgz, .mrc, .map, .tif of several pages, .npy of labels), a field (.npy), builtin:NAME, or a region as box:... or ball:..."
     )]
     UnknownInput(String),

@@ -186,7 +186,7 @@ impl Source {
         }
         let file = input.file()?;
         Ok(match &*file.extension() {
-            "obj" | "stl" | "ply" => Self::Mesh(file),
+            "obj" | "off" | "stl" | "ply" => Self::Mesh(file),
             "tif" | "tiff" if file.is_stack() => Self::Volume(file),
             "png" | "jpg" | "jpeg" | "webp" | "gif" | "tif" | "tiff" | "bmp" => Self::Image(file),
             "npy" => match file.axes_of_labels()? {

@@ -101,7 +101,7 @@ impl Surface {
     /// The bytes of a mesh file: the file of the input in its own format, the triangles alone in another one.
     ///
     /// # Errors
-    /// Formats other than `ply`, `obj` and `stl`; a mesh without faces.
+    /// Formats other than `ply`, `obj`, `stl` and `off`; a mesh without faces.
     pub fn encode(&self, format: &str) -> Result<Vec<u8>> {
         match &self.file {
             Some(file) if file.format == format => Ok(file.bytes.clone()),
@@ -120,7 +120,7 @@ pub struct MeshFile {
 }
 
 impl Shape {
-    /// The bytes of a file: `png` or `svg` of a curve, `ply`, `obj` or `stl` of a surface. The file of an input whose vertices followed the flow
+    /// The bytes of a file: `png` or `svg` of a curve, `ply`, `obj`, `stl` or `off` of a surface. The file of an input whose vertices followed the flow
     /// keeps everything else that it had.
     ///
     /// # Errors

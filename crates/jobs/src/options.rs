@@ -23,7 +23,7 @@ const ADVANCED: &str = "Advanced";
 pub struct InputOptions {
     /// A mesh, an image, a volume of voxels, a field, a built-in shape or a region
     ///
-    /// A mesh is .obj, .stl or .ply. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh,
+    /// A mesh is .obj, .stl, .ply or .off. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh,
     /// .mgz, .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc,
     /// ring, cross, rectangle, sphere, cube, torus, coin, figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is
     /// box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is standard input.
@@ -244,7 +244,7 @@ pub struct RunOptions {
 
     /// Write the result to this file too
     ///
-    /// In 3D the result is a mesh (.ply, .obj, .stl), in 2D a picture (.png, .svg). The name - means standard output.
+    /// In 3D the result is a mesh (.ply, .obj, .stl, .off), in 2D a picture (.png, .svg). The name - means standard output.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     pub save: Option<PathBuf>,
 
@@ -452,7 +452,7 @@ pub struct FairOptions {
 
     /// Part of the mesh that does not move: a box, a ball, the inside of a closed mesh, or a colour
     ///
-    /// A box is box:x0,y0,z0,x1,y1,z1, and a ball is ball:x,y,z,r. A closed mesh is a file (.obj, .stl, .ply). All three are in the coordinates of
+    /// A box is box:x0,y0,z0,x1,y1,z1, and a ball is ball:x,y,z,r. A closed mesh is a file (.obj, .stl, .ply, .off). All three are in the coordinates of
     /// the input. colour:ff0000 means the vertices of this colour.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = FLOW)]
     pub keep: Option<String>,
@@ -556,7 +556,7 @@ pub struct SampleOptions {
 
     /// The file to write
     ///
-    /// It is a picture (.png, or .svg for a shape in 2D), a mesh (.ply, .obj, .stl), a field (.npy, .vti) or a segmentation (.nii, .nii.gz).
+    /// It is a picture (.png, or .svg for a shape in 2D), a mesh (.ply, .obj, .stl, .off), a field (.npy, .vti) or a segmentation (.nii, .nii.gz).
     #[arg(long, value_name = "FILE")]
     pub save: PathBuf,
 

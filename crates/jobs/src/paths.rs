@@ -3,7 +3,7 @@
 use crate::prelude::*;
 
 /// The extensions of meshes, the usual one first.
-pub const MESHES: [&str; 3] = ["ply", "obj", "stl"];
+pub const MESHES: [&str; 4] = ["ply", "obj", "stl", "off"];
 
 /// The path of a file from wherever the program may run later.
 ///

@@ -231,7 +231,7 @@ pub enum Refusal {
 
     /// A file for an input whose extension says nothing.
     #[error(
-        "`save` {} must end in .png, .svg, .ply, .obj, .stl, .npy, .vti, .nii or .nii.gz",
+        "`save` {} must end in .png, .svg, .ply, .obj, .stl, .off, .npy, .vti, .nii or .nii.gz",
         .0.display()
     )]
     SampleFormat(PathBuf),

@@ -14,7 +14,7 @@ use crate::read::error::FormatError;
 #[non_exhaustive]
 pub enum Error {
     #[error(
-        "{path} has no known extension; meshes are read and written as .obj, .ply or .stl",
+        "{path} has no known extension; meshes are read and written as .obj, .off, .ply or .stl",
         path = path.display()
     )]
     UnknownFormat { path: PathBuf },

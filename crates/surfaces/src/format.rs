@@ -10,6 +10,7 @@ use crate::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Obj,
+    Off,
     Ply,
     Stl,
 }
@@ -20,6 +21,7 @@ impl Format {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
         match extension.to_ascii_lowercase().as_str() {
             "obj" => Ok(Self::Obj),
+            "off" => Ok(Self::Off),
             "ply" => Ok(Self::Ply),
             "stl" => Ok(Self::Stl),
             _ => Err(Error::UnknownFormat { path: path.into() }),
@@ -27,11 +29,11 @@ impl Format {
     }
 }
 
-/// How a mesh file names its upward axis: a line of the header of PLY, a line of comment at the top of OBJ, and the
-/// whole comment of binary STL.
+/// How a mesh file names its upward axis: a line of the header of PLY, a line of comment at the top of OBJ and behind the first line of OFF, and
+/// the whole comment of binary STL.
 pub(crate) fn up_line(format: Format, up: UpAxis) -> String {
     match format {
-        Format::Obj => format!("# up {up}\n"),
+        Format::Obj | Format::Off => format!("# up {up}\n"),
         Format::Ply => format!("comment up {up}\n"),
         Format::Stl => format!("up {up}"),
     }
@@ -55,11 +57,15 @@ pub fn up_axis(path: impl AsRef<Path>) -> Result<UpAxis, Error> {
 pub fn up_axis_of(bytes: &[u8], path: impl AsRef<Path>) -> Result<UpAxis, Error> {
     let path = path.as_ref();
     let format = Format::of(path)?;
+    let bytes = files::without_mark(bytes);
     // The lines in which a file may name it.
     let header: Vec<&[u8]> = match format {
         Format::Stl => bytes.get(..80).into_iter().collect(),
         Format::Obj => (bytes.split(|&byte| byte == b'\n'))
             .take_while(|line| line.starts_with(b"#"))
+            .collect(),
+        Format::Off => (bytes.split(|&byte| byte == b'\n').take(2))
+            .filter(|line| line.starts_with(b"#"))
             .collect(),
         Format::Ply => (bytes.split(|&byte| byte == b'\n'))
             .take_while(|line| !line.starts_with(b"end_header"))
@@ -78,13 +84,13 @@ pub fn up_axis_of(bytes: &[u8], path: impl AsRef<Path>) -> Result<UpAxis, Error>
 }
 
 /// The axis that points up in most meshes of that format, by the extension: `y` in OBJ files, which
-/// come from animation, `z` in PLY and STL files, which come from scanners and for printers.
+/// come from animation, `z` in OFF, PLY and STL files, which come from scanners and for printers.
 ///
 /// # Errors
 /// [`Error::UnknownFormat`].
 pub fn usual_up_axis(path: impl AsRef<Path>) -> Result<UpAxis, Error> {
     Ok(match Format::of(path.as_ref())? {
         Format::Obj => UpAxis::Y,
-        Format::Ply | Format::Stl => UpAxis::Z,
+        Format::Off | Format::Ply | Format::Stl => UpAxis::Z,
     })
 }

@@ -93,7 +93,7 @@ pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use mesh::TriangleMesh;
 pub use parts::Parts;
 pub use read::error::FormatError;
-pub use read::{decode, read, rewrite, vertex_colours};
+pub use read::{decode, is_binary_stl, read, rewrite, vertex_colours};
 pub use remeshing::remeshed_surface;
 pub use repair::{RepairChanges, Repaired, repair};
 pub use signs::mend_signs;

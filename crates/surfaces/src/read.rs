@@ -2,8 +2,10 @@
 
 pub(crate) mod error;
 mod obj;
+mod off;
 mod ply;
 mod stl;
+mod text;
 
 use std::path::Path;
 
@@ -12,13 +14,17 @@ use crate::vector::Vector;
 use crate::{Error, TriangleMesh};
 use error::FormatError;
 
-/// Reads a mesh; the extension (`.obj`, `.ply`, `.stl`) tells the format.
+/// Reads a mesh; the extension (`.obj`, `.off`, `.ply`, `.stl`) tells the format.
 ///
-/// - OBJ: `v` and `f`, with relative indices; groups, normals, colours and everything else are
+/// - OBJ: `v` and `f`, with relative indices, lines that go on behind a backslash, and comments; groups, normals, colours and everything else are
 ///   passed over.
+/// - OFF: text, also with normals, colours and texture coordinates of vertices (`STCNOFF`), and colours of faces, which are passed over.
 /// - PLY: ASCII and binary of both byte orders; `x y z` of `vertex`, with `nx ny nz` if they are
 ///   there, and `vertex_indices` (or `vertex_index`) of `face` and of `tristrips`, where -1 ends a strip; everything else is passed over.
-/// - STL: binary and ASCII; corners with exactly equal coordinates become one vertex.
+/// - STL: binary and ASCII; corners with exactly equal coordinates become one vertex. Bytes behind the
+///   facets are passed over.
+///
+/// Text may begin with the byte order mark of UTF-8.
 ///
 /// Polygons are cut into triangles from their first corner, which is right for convex ones.
 ///
@@ -43,23 +49,27 @@ pub fn read(path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// [`Error::UnknownFormat`] and [`Error::Format`].
 pub fn decode(bytes: &[u8], path: impl AsRef<Path>) -> Result<TriangleMesh, Error> {
-    by_format(path.as_ref(), |format| match format {
-        _ if bytes.is_empty() => Err(FormatError::Empty),
+    if bytes.is_empty() {
+        return by_format(path.as_ref(), |_| Err(FormatError::Empty));
+    }
+    by_contents(bytes, path.as_ref(), |format, bytes| match format {
         Format::Obj => obj::decode(bytes),
+        Format::Off => off::decode(bytes),
         Format::Ply => ply::decode(bytes),
         Format::Stl => stl::decode(bytes),
     })
 }
 
 /// The colours (red, green, blue, from 0 to 255) of the vertices in a mesh file, in the order of [`decode`]: `red`, `green` and `blue`
-/// of PLY, as integers or as parts of 1, and three numbers from 0 to 1 after the coordinates in OBJ. `None` where a vertex has none, as
+/// of PLY, as integers or as parts of 1, three numbers from 0 to 1 after the coordinates in OBJ, and the colours of COFF. `None` where a vertex has none, as
 /// in all STL files.
 ///
 /// # Errors
 /// [`Error::UnknownFormat`], and [`Error::Format`] for bytes that are no such mesh.
 pub fn vertex_colours(bytes: &[u8], path: impl AsRef<Path>) -> Result<Option<Vec<[u8; 3]>>, Error> {
-    by_format(path.as_ref(), |format| match format {
+    by_contents(bytes, path.as_ref(), |format, bytes| match format {
         Format::Obj => Ok(obj::colours(bytes)),
+        Format::Off => off::colours(bytes),
         Format::Ply => ply::colours(bytes),
         Format::Stl => Ok(None),
     })
@@ -79,10 +89,35 @@ pub fn rewrite(
     path: impl AsRef<Path>,
     moved: &TriangleMesh,
 ) -> Result<Vec<u8>, Error> {
-    by_format(path.as_ref(), |format| match format {
+    let mark = text::mark(bytes);
+    let rewritten = by_contents(bytes, path.as_ref(), |format, bytes| match format {
         Format::Obj => obj::rewrite(bytes, moved),
+        Format::Off => off::rewrite(bytes, moved),
         Format::Ply => ply::rewrite(bytes, moved),
         Format::Stl => Ok(stl::rewrite(bytes, moved)),
+    })?;
+    Ok([mark, &rewritten].concat())
+}
+
+/// Whether these are all facets of a binary STL file.
+pub fn is_binary_stl(bytes: &[u8]) -> bool {
+    stl::is_binary(bytes)
+}
+
+/// What a reader of the format makes of the contents of a file of that name, without the mark of a text.
+fn by_contents<T>(
+    bytes: &[u8],
+    path: &Path,
+    read: impl FnOnce(Format, &[u8]) -> Result<T, FormatError>,
+) -> Result<T, Error> {
+    by_format(path, |format| {
+        let is_binary = format == Format::Stl && stl::is_binary(bytes);
+        let bytes = if is_binary {
+            bytes
+        } else {
+            text::without_mark(bytes)?
+        };
+        read(format, bytes)
     })
 }
 
@@ -103,6 +138,18 @@ fn side_of(normals: impl Iterator<Item = (Vector, Vector)>) -> f64 {
         .map(|(by_faces, read)| by_faces.normalize_or_zero().dot(read.normalize_or_zero()))
         .sum();
     if agreement < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The normals of moved vertices, on the side of most of those in the file.
+fn normals_like(file: TriangleMesh, moved: &TriangleMesh) -> Vec<[f64; 3]> {
+    let by_faces = file.vertex_normals().into_iter().map(Vector::from_array);
+    let read = file.normals.into_iter().flatten().map(Vector::from_array);
+    let side = side_of(by_faces.zip(read));
+    let mut normals = moved.vertex_normals();
+    for normal in &mut normals {
+        *normal = normal.map(|x| side * x);
+    }
+    normals
 }
 
 /// A part of 1 in 255 steps.

@@ -10,10 +10,11 @@ use crate::format::{Format, up_line, usual_up_axis};
 use crate::vector::{Vector, scaled_normal};
 use crate::{Error, TriangleMesh};
 
-/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.ply`, `.stl`)
-/// tells the format.
+/// Writes a mesh, atomically (see [`write_atomically`]); the extension (`.obj`, `.off`, `.ply`,
+/// `.stl`) tells the format.
 ///
 /// - OBJ: text; coordinates and normals as the shortest decimals that read back to the last bit.
+/// - OFF: text, in the same decimals, without normals.
 /// - PLY: binary, little-endian, double precision, with normals.
 /// - STL: binary. Single precision, no normals of vertices.
 ///
@@ -59,7 +60,7 @@ pub fn encode_with_up(
     let format = Format::of(path)?;
     mesh.check(match format {
         Format::Stl => f64::from(f32::MAX),
-        Format::Obj | Format::Ply => f64::MAX,
+        Format::Obj | Format::Off | Format::Ply => f64::MAX,
     })?;
     let faces = u32::try_from(mesh.faces.len()).map_err(|_| Error::TooLarge {
         elements: "faces",
@@ -75,6 +76,7 @@ pub fn encode_with_up(
     };
     Ok(match format {
         Format::Obj => (comment + &obj(mesh)).into_bytes(),
+        Format::Off => off(&comment, mesh).into_bytes(),
         Format::Ply => ply(&comment, mesh),
         Format::Stl => stl(&comment, mesh, faces),
     })
@@ -97,6 +99,19 @@ fn obj(mesh: &TriangleMesh) -> String {
         } else {
             writeln!(out, "f {a} {b} {c}")
         };
+    }
+    out
+}
+
+fn off(comment: &str, mesh: &TriangleMesh) -> String {
+    let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
+    let mut out = format!("OFF\n{comment}{vertices} {faces} 0\n");
+    // Writing to a string does not fail.
+    for [x, y, z] in &mesh.vertices {
+        let _ = writeln!(out, "{x} {y} {z}");
+    }
+    for [a, b, c] in &mesh.faces {
+        let _ = writeln!(out, "3 {a} {b} {c}");
     }
     out
 }

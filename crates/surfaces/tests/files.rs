@@ -20,7 +20,7 @@ fn problem(extension: &str, bytes: impl AsRef<[u8]>) -> FormatError {
 }
 
 #[test]
-fn obj_and_ply_round_trip_bit_for_bit() {
+fn obj_off_and_ply_round_trip_bit_for_bit() {
     let with_normals = samples::lever(48).unwrap().into_mesh();
     assert!(with_normals.normals.is_some());
     for mesh in [torus(0.5, 1.0 / 7.0, 30, 20), with_normals] {
@@ -30,6 +30,7 @@ fn obj_and_ply_round_trip_bit_for_bit() {
             ..mesh.clone()
         };
         assert_eq!(decode("OBJ", &encode("obj", &mesh)).unwrap(), plain);
+        assert_eq!(decode("OFF", &encode("off", &mesh)).unwrap(), plain);
     }
 }
 
@@ -444,12 +445,12 @@ fn unusable_normals_are_dropped() {
 
 #[test]
 fn unknown_extensions_and_missing_files_are_told() {
-    for path in ["mesh.off", "mesh", "obj", ".ply", "mesh.stl.gz"] {
+    for path in ["mesh.wrl", "mesh", "obj", ".ply", "mesh.stl.gz"] {
         let text = read(path).unwrap_err().to_string();
         assert_eq!(
             text,
             format!(
-                "{path} has no known extension; meshes are read and written as .obj, .ply or .stl"
+                "{path} has no known extension; meshes are read and written as .obj, .off, .ply or .stl"
             )
         );
         assert!(matches!(
@@ -477,6 +478,7 @@ fn unknown_extensions_and_missing_files_are_told() {
 fn the_format_tells_which_axis_usually_points_up() {
     for (path, up) in [
         ("a.OBJ", UpAxis::Y),
+        ("a.off", UpAxis::Z),
         ("a.ply", UpAxis::Z),
         ("a.stl", UpAxis::Z),
     ] {
@@ -490,7 +492,7 @@ fn the_format_tells_which_axis_usually_points_up() {
 fn a_file_names_the_axis_that_points_up_where_it_is_not_the_usual_one() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = samples::lever(48).unwrap().into_mesh();
-    for extension in ["obj", "ply", "stl"] {
+    for extension in ["obj", "off", "ply", "stl"] {
         let path = folder.path().join("mesh").with_extension(extension);
         write(&path, &mesh).unwrap();
         let (plain, usual) = (fs::read(&path).unwrap(), read(&path).unwrap());
@@ -518,7 +520,7 @@ fn a_file_names_the_axis_that_points_up_where_it_is_not_the_usual_one() {
 #[test]
 fn unusable_meshes_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
-    for extension in ["obj", "ply", "stl"] {
+    for extension in ["obj", "off", "ply", "stl"] {
         let path = folder.path().join("mesh").with_extension(extension);
         let refused = |spoil: fn(&mut TriangleMesh)| {
             let mut mesh = cube(1.0);
@@ -544,4 +546,205 @@ fn unusable_meshes_are_not_written() {
     );
     assert!(write(folder.path().join("mesh.ply"), &huge).is_ok());
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// As other programs read it, and with its vertices moved.
+fn assert_reads(extension: &str, bytes: &[u8], expected: &TriangleMesh) -> Vec<u8> {
+    let mesh = decode(extension, bytes).unwrap();
+    assert_eq!(
+        (&mesh.vertices, &mesh.faces),
+        (&expected.vertices, &expected.faces),
+        "{}",
+        String::from_utf8_lossy(bytes)
+    );
+    let mut moved = mesh;
+    for x in moved.vertices.as_flattened_mut() {
+        *x += 0.5;
+    }
+    let path = Path::new("mesh").with_extension(extension);
+    let rewritten = surfaces::rewrite(bytes, path, &moved).unwrap();
+    assert_eq!(
+        decode(extension, &rewritten).unwrap().vertices,
+        moved.vertices
+    );
+    rewritten
+}
+
+#[test]
+fn off_variants_are_understood() {
+    let expected = decode(
+        "obj",
+        [TETRAHEDRON, "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4"]
+            .concat()
+            .as_bytes(),
+    );
+    let expected = expected.unwrap();
+    let faces = "3 0 2 1\n3 0 1 3 255 0 0\n3 0 3 2 # red\n3 1 2 3 0.5 0.5 0.5 1\n";
+    for vertices in [
+        "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n",
+        "# made by hand\n\nOFF 4 4\n\n0 0 0\n1 0 0 # a corner\n\n0 1 0\n0 0 1\n\n",
+        "4 4 0\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n0 0 1\r\n",
+        "\u{feff}COFF\n4 4 0\n0 0 0 255 0 0 255\n1 0 0 0 9 0 255\n0 1 0 0 0 9 255\n0 0 1 1 2 3 255\n",
+    ] {
+        let text = [vertices, faces].concat();
+        let rewritten = assert_reads("off", text.as_bytes(), &expected);
+        let moved = String::from_utf8(rewritten).unwrap();
+        assert!(moved.contains("1.5 0.5 0.5"), "{moved}");
+        assert!(moved.ends_with(faces), "{moved}");
+    }
+    // Colours as whole numbers and as parts of 1, behind normals.
+    let colours = |text: &str| surfaces::vertex_colours(text.as_bytes(), "a.off").unwrap();
+    let coloured =
+        "CNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0\n1 0 0 0 0 1 0 1 0\n0 1 0 0 0 1 0 0 255\n3 0 1 2\n";
+    assert_eq!(
+        colours(coloured),
+        Some(vec![[1, 0, 0], [0, 1, 0], [0, 0, 255]])
+    );
+    let parts = coloured.replace("255", "0.2");
+    assert_eq!(
+        colours(&parts),
+        Some(vec![[255, 0, 0], [0, 255, 0], [0, 0, 51]])
+    );
+    assert_eq!(colours("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2"), None);
+    // Normals are made anew, on the side that they have.
+    let mut turned = decode("off", coloured.replace("0 0 1 ", "0 0 -1 ").as_bytes()).unwrap();
+    assert_eq!(turned.normals, Some(vec![[0.0, 0.0, -1.0]; 3]));
+    turned
+        .vertices
+        .iter_mut()
+        .for_each(|x| *x = [x[2], x[0], x[1]]);
+    let rewritten = surfaces::rewrite(coloured.as_bytes(), "a.off", &turned).unwrap();
+    let text = String::from_utf8(rewritten).unwrap();
+    assert!(text.contains("\n0 1 0 1 0 0 0 1 0\n"), "{text}");
+}
+
+#[test]
+fn broken_off_files_are_explained() {
+    let message = |text: &str| problem("off", text).to_string();
+    for (text, expected) in [
+        (
+            "PLY\n",
+            "line 1 has \"PLY\" where OFF, or the numbers of vertices, faces and edges, is expected",
+        ),
+        ("XOFF\n", "line 1 has \"XOFF\" where OFF is expected"),
+        (
+            "OFF BINARY\n\0\0",
+            "binary OFF is not read; save it as text, or as PLY",
+        ),
+        (
+            "4OFF\n1 1 0\n",
+            "4OFF is not read: its vertices have four or any number of coordinates; save it as OFF",
+        ),
+        (
+            "OFF\n",
+            "the file ends in line 1 where the numbers of vertices and faces is expected: it is truncated",
+        ),
+        (
+            "OFF\n3 1 0\n0 0 0\n1 0 0\n",
+            "the file ends in line 4 where a vertex is expected: it is truncated",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 x\n",
+            "line 3 has \"x\" where a coordinate is expected",
+        ),
+        (
+            "OFF\n1 2 0\n0 0 0\n3 0 0 0",
+            "the file ends in line 4 where a face is expected: it is truncated",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n3 0 0",
+            "line 4 has \"\" where the index of a vertex is expected",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n3 0 0 1",
+            "face 0 refers to vertex 1, but the file has 1 vertices, the first of which is 0",
+        ),
+        (
+            "OFF\n99999999999 1 0\n0 0 0\n",
+            "the file ends in line 3 where a vertex is expected: it is truncated",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n9999999999 0 0",
+            "line 4 has \"\" where the index of a vertex is expected",
+        ),
+    ] {
+        assert_eq!(message(text), expected, "{text:?}");
+    }
+}
+
+/// Byte order marks, comments behind faces, lines that go on, and bytes behind the facets: other programs read them, and what is not
+/// understood stays when the vertices move.
+#[test]
+fn what_other_programs_write_around_a_mesh_is_no_fault() {
+    let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    let obj = [TETRAHEDRON, faces].concat();
+    let expected = decode("obj", obj.as_bytes()).unwrap();
+    let marked = assert_reads("obj", &["\u{feff}", &obj].concat().into_bytes(), &expected);
+    assert!(marked.starts_with("\u{feff}v 0.5 0.5 0.5\n".as_bytes()));
+    let commented = obj
+        .replace("f 1 3 2", "f 1 3 2 # a face")
+        .replace("v 1 0 0", "v 1 0 0#x");
+    let commented = assert_reads("obj", commented.as_bytes(), &expected);
+    assert!(
+        String::from_utf8(commented)
+            .unwrap()
+            .contains("\nv 1.5 0.5 0.5 #x\n")
+    );
+    for (from, to) in [
+        ("f 1 3 2", "f 1 3 \\\n 2"),
+        ("f 1 3 2", "f 1\\\r\n3 \\ \n\\\n2"),
+        ("v 1 0 0", "v 1 \\\n 0\\\n 0"),
+        // A path or a comment does not go on.
+        ("v 1 0 0", "mtllib C:\\\nv 1 0 0"),
+        ("v 1 0 0", "# C:\\\nv 1 0 0 # D:\\"),
+    ] {
+        assert_reads("obj", obj.replace(from, to).as_bytes(), &expected);
+    }
+    let message = problem("obj", "v 0 0 0\nf 1 \\\n 1 1\nf 1 1 x").to_string();
+    assert_eq!(
+        message,
+        "line 4 has \"x\" where the index of a vertex is expected"
+    );
+
+    let text = format!("solid a\n{FACET}endsolid a\n");
+    let one = decode("stl", text.as_bytes()).unwrap();
+    let marked = assert_reads("stl", &["\u{feff}", &text].concat().into_bytes(), &one);
+    assert!(marked.starts_with("\u{feff}solid a\n".as_bytes()));
+    assert_reads("stl", &[text.as_bytes(), b"\x1a\0\0"].concat(), &one);
+    let mut binary = encode("stl", &cube(0.5));
+    let cube = decode("stl", &binary).unwrap();
+    binary.extend([7; 40]);
+    let moved = assert_reads("stl", &binary, &cube);
+    assert_eq!(
+        (moved.len(), &moved[moved.len() - 40..]),
+        (binary.len(), &[7; 40][..])
+    );
+    binary.truncate(binary.len() - 41);
+    let message = problem("stl", &binary).to_string();
+    assert!(
+        message.ends_with("truncated, or another format"),
+        "{message}"
+    );
+
+    let ply = String::from_utf8(ply("ascii")).unwrap();
+    let ply = ply.replace("short z", "float z").into_bytes();
+    assert_reads(
+        "ply",
+        &["\u{feff}".as_bytes(), &ply, b"and more\n"].concat(),
+        &decode("ply", &ply).unwrap(),
+    );
+    for extension in ["obj", "off", "ply", "stl"] {
+        for mark in [b"\xff\xfe", b"\xfe\xff"] {
+            let text = [&mark[..], b"v\0 \x000\0"].concat();
+            assert_eq!(
+                problem(extension, text).to_string(),
+                "the text is UTF-16; save it as UTF-8"
+            );
+        }
+    }
+    // The axis is found behind a mark, too.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("marked.obj");
+    fs::write(&path, ["\u{feff}# up z\n", &obj].concat()).unwrap();
+    assert_eq!(up_axis(&path).unwrap(), UpAxis::Z);
 }

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use crate::common::files::{ENCODINGS, FACET, encode, ply};
 use crate::common::sphere;
+use files::UTF8_MARK;
 use fuzzing::{Fuzz, Limit, assert_short_line, peak_of};
-use surfaces::{ClosedMesh, TriangleMesh, decode};
+use surfaces::{ClosedMesh, TriangleMesh, decode, rewrite, vertex_colours};
 
 /// As documented at [`surfaces::read`].
 const LIMIT: Limit = Limit {
@@ -36,7 +37,7 @@ fn fuzzing_obj_files() {
         ])
         .starts(["f ", "v "])
         .words([
-            "v ", "f ", "\nv", "\nf", "f", "1/2/3 ", "-1 ", "\n", "//", "\r\n",
+            "v ", "f ", "\nv", "\nf", "f", "1/2/3 ", "-1 ", "\n", "//", "\r\n", "\\\n", " # ",
         ]);
     fuzzed.run(|bytes| decode(bytes, "a.obj"), check);
 }
@@ -73,6 +74,48 @@ fn fuzzing_stl_files() {
             bytes
         });
     fuzzed.run(|bytes| decode(bytes, "a.stl"), check);
+}
+
+#[test]
+fn fuzzing_off_files() {
+    let coloured = "# a comment\nSTCNOFF 4 3 6\n0 0 0 0 0 1 255 0 0 1 1\n1 0 0 0 0 1 9 9 9\n\n\
+                    1 1 0 0 0 1 1 2 3 # there\n0 1 1e-1 0 1 0 4 5 6\n3 0 1 2\n4 0 1 2 3 0.5 0.5 1\n3 3 2 1\n";
+    let fuzzed = Fuzz::new("off", LIMIT)
+        .valid([
+            encode("off", &sphere([0.0; 3], 1.0, 1)),
+            coloured.as_bytes().to_vec(),
+            [UTF8_MARK, b"3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2"].concat(),
+        ])
+        .starts(["OFF\n3 1 0\n", "COFF ", "OFF BINARY\n"])
+        .words([
+            "OFF",
+            "ST",
+            "C",
+            "N",
+            "4",
+            "n",
+            "BINARY",
+            "# ",
+            "\n",
+            "\r\n",
+            "3 0 1 2\n",
+            "0 0 0\n",
+            "1e9 ",
+        ]);
+    fuzzed.run(
+        |bytes| decode(bytes, "a.off"),
+        |bytes, mesh| {
+            // Colours and the moved file are made of the same rows.
+            let colours = vertex_colours(bytes, "a.off").unwrap();
+            assert!(colours.is_none_or(|colours| colours.len() == mesh.vertices.len()));
+            let again = decode(&rewrite(bytes, "a.off", &mesh).unwrap(), "a.off").unwrap();
+            assert_eq!(
+                (&again.vertices, &again.faces),
+                (&mesh.vertices, &mesh.faces)
+            );
+            check(bytes, mesh);
+        },
+    );
 }
 
 #[test]
@@ -128,6 +171,12 @@ fn the_worst_files_stay_within_the_limit() {
         ("obj", "v 0 0 0\n".to_string(), "f 1 1 1\n"),
         ("obj", "v 0 0 0\n".to_string(), "f\n"),
         ("obj", "\u{feff}".to_string(), "\u{0}"),
+        ("obj", "v 0 0 0\n".to_string(), "f 1\\\n1 1\n"),
+        ("obj", "v".to_string(), "\\\n"),
+        ("off", "OFF 200000 0 0\n".to_string(), "0 0 0\n"),
+        ("off", "OFF 1 200000 0\n0 0 0\n".to_string(), "3 0 0 0\n"),
+        ("off", "OFF 1 2 0\n0 0 0\n500000 ".to_string(), "0 "),
+        ("off", String::new(), "\u{0}"),
         ("stl", "solid\nfacet\n".to_string(), "vertex 0 0 0\n"),
         (
             "stl",

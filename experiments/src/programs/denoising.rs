@@ -95,7 +95,7 @@ struct Options {
     #[command(flatten)]
     run: RunOptions,
 
-    /// Denoise this clean mesh too (OBJ, PLY or STL); can be repeated [default: the meshes of scripts/fetch_meshes, where they are here]
+    /// Denoise this clean mesh too (OBJ, OFF, PLY or STL); can be repeated [default: the meshes of scripts/fetch_meshes, where they are here]
     #[arg(long, value_name = "FILE")]
     mesh: Vec<PathBuf>,
 }

@@ -21,7 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 #[derive(Parser, Debug)]
 #[command(version)]
 struct Options {
-    /// The mesh: OBJ, STL or PLY
+    /// The mesh: OBJ, OFF, STL or PLY
     #[arg(long, value_name = "FILE")]
     mesh: PathBuf,
 

@@ -17,7 +17,7 @@ from .tables import SWEEP, Run
 
 RUNS = Path("results/runs")
 MESHES = Path("results/meshes")
-MESH_SUFFIXES = {".ply", ".obj", ".stl"}
+MESH_SUFFIXES = {".ply", ".obj", ".stl", ".off"}
 # How messages of the program begin, and parts of three of them.
 ERROR, WARNING = "error: ", "warning: "
 HELD = "cannot start a run in"

@@ -22,7 +22,7 @@ OWN_COLUMNS = {"run", "command", "input", "folder", "path", "files"}
 FILE_OPTIONS = ("mask", "keep", "network")
 NO_FILE = re.compile(r"(builtin|box|ball|colour):")
 # What the program reads in space.
-SUFFIXES = (".obj", ".stl", ".ply", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mgh", ".mgz", ".mrc", ".map", ".tif", ".tiff", ".npy")
+SUFFIXES = (".obj", ".stl", ".ply", ".off", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mgh", ".mgz", ".mrc", ".map", ".tif", ".tiff", ".npy")
 GPUS = {"wgpu", "cuda"}
 
 Cells = dict[str, Any]

@@ -8,6 +8,12 @@
 pub enum FormatError {
     #[error("the file is empty")]
     Empty,
+    #[error("the text is UTF-16; save it as UTF-8")]
+    Utf16,
+    #[error("binary OFF is not read; save it as text, or as PLY")]
+    BinaryOff,
+    #[error("{0} is not read: its vertices have four or any number of coordinates; save it as OFF")]
+    Dimension(String),
     #[error("line {line} has {found:?} where {expected} is expected")]
     Line {
         line: usize,

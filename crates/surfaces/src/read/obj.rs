@@ -3,9 +3,65 @@
 //! Not by a library: of those, `tobj` takes polylines for faces, splits vertices between groups,
 //! and tells no line numbers; `obj` reads single precision.
 
+use super::text::{line_end, split_comment};
 use super::{FormatError, Polygons, level, position, side_of};
 use crate::TriangleMesh;
 use crate::vector::Vector;
+
+/// The statements that are read.
+const READ: [&str; 3] = ["v", "vn", "f"];
+
+/// A statement with its line, which goes on behind a backslash at its end.
+struct Statement<'a> {
+    /// The number of its first line, from one.
+    number: usize,
+    line: &'a [u8],
+}
+
+/// The statements of a text, one for each line. Only those that are [read](READ) go on: comments and names may end with a backslash, too.
+fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
+    let (mut rest, mut lines) = (bytes, 0);
+    std::iter::from_fn(move || {
+        let number = lines + 1;
+        let is_read = READ
+            .iter()
+            .any(|keyword| Some(*keyword) == keyword_of(rest));
+        let mut length = 0;
+        for line in rest.split_inclusive(|&byte| byte == b'\n') {
+            length += line.len();
+            lines += 1;
+            if !is_read || line.contains(&b'#') || !line.trim_ascii_end().ends_with(b"\\") {
+                break;
+            }
+        }
+        let (line, behind) = rest.split_at(length);
+        rest = behind;
+        (!line.is_empty()).then_some(Statement { number, line })
+    })
+}
+
+/// The first word of a line.
+fn keyword_of(line: &[u8]) -> Option<&str> {
+    let line = line.split(|&byte| byte == b'\n').next()?;
+    let word = line
+        .trim_ascii_start()
+        .split(u8::is_ascii_whitespace)
+        .next()?;
+    std::str::from_utf8(word).ok()
+}
+
+impl Statement<'_> {
+    /// Its words, and its comment. Names and comments may be in any encoding.
+    fn split<T>(
+        &self,
+        read: impl for<'b> FnOnce(&mut dyn Iterator<Item = &'b str>, &'b str) -> T,
+    ) -> T {
+        let text = String::from_utf8_lossy(self.line);
+        let (before, comment) = split_comment(&text);
+        let mut words = before.split(|c: char| c.is_whitespace() || c == '\\');
+        read(&mut words.by_ref().filter(|word| !word.is_empty()), comment)
+    }
+}
 
 /// What counts of a text; all other statements are passed over.
 #[derive(Default)]
@@ -20,30 +76,36 @@ struct Statements {
 
 impl Statements {
     fn of(bytes: &[u8]) -> Result<Self, FormatError> {
-        // Names and comments may be in any encoding.
-        let text = String::from_utf8_lossy(bytes);
         let mut found = Self::default();
-        for (number, line) in text.lines().enumerate() {
-            let mut words = line.split_whitespace();
-            let vertices = found.vertices.len();
-            match words.next() {
-                Some("v") => (found.vertices).push(position(words, number + 1, vertices)?),
-                Some("vn") => {
-                    let mut numbers = words.map(|word| word.parse().unwrap_or(0.0));
-                    let normal = std::array::from_fn(|_| numbers.next().unwrap_or(0.0));
-                    found.normals.push(Vector::from_array(normal));
-                }
-                Some("f") => {
-                    for word in words {
-                        let vertex = corner(word, number + 1, vertices)?;
-                        found.corners.push((vertex, found.normal(word)));
-                    }
-                    found.ends.push(found.corners.len());
-                }
-                _ => {}
-            }
+        for statement in statements(bytes) {
+            statement.split(|words, _| found.add(statement.number, words))?;
         }
         Ok(found)
+    }
+
+    fn add<'a>(
+        &mut self,
+        line: usize,
+        mut words: impl Iterator<Item = &'a str>,
+    ) -> Result<(), FormatError> {
+        let vertices = self.vertices.len();
+        match words.next() {
+            Some("v") => self.vertices.push(position(words, line, vertices)?),
+            Some("vn") => {
+                let mut numbers = words.map(|word| word.parse().unwrap_or(0.0));
+                let normal = std::array::from_fn(|_| numbers.next().unwrap_or(0.0));
+                self.normals.push(Vector::from_array(normal));
+            }
+            Some("f") => {
+                for word in words {
+                    let vertex = corner(word, line, vertices)?;
+                    self.corners.push((vertex, self.normal(word)));
+                }
+                self.ends.push(self.corners.len());
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     /// The corners of each face.
@@ -106,13 +168,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
 
 /// The colours behind the coordinates of the vertices, if all have some.
 pub(super) fn colours(bytes: &[u8]) -> Option<Vec<[u8; 3]>> {
-    let text = String::from_utf8_lossy(bytes);
-    let vertices = text.lines().filter_map(|line| {
-        let mut words = line.split_whitespace();
-        (words.next() == Some("v")).then_some(words)
-    });
-    let colour = |words: std::str::SplitWhitespace<'_>| {
-        let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
+    let vertices = statements(bytes).filter(|statement| keyword_of(statement.line) == Some("v"));
+    let colour = |statement: Statement<'_>| {
+        let parsed = |words: &mut dyn Iterator<Item = &str>| {
+            words.skip(1).map(|word| word.parse().ok()).collect()
+        };
+        let numbers: Option<Vec<f64>> = statement.split(|words, _| parsed(words));
         match numbers?[..] {
             [_, _, _, r, g, b] => Some([r, g, b].map(level)),
             _ => None,
@@ -140,25 +201,28 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
     let mut normals = normals(bytes, moved)?.into_iter();
     let mut vertices = moved.vertices.iter();
     let mut out = Vec::with_capacity(bytes.len());
-    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
-        let text = String::from_utf8_lossy(line);
-        let mut words = text.split_whitespace();
-        let (keyword, numbers) = match words.next() {
+    for statement in statements(bytes) {
+        let (keyword, numbers) = match keyword_of(statement.line) {
             Some("v") => ("v", vertices.next().copied()),
             Some("vn") => ("vn", normals.next().flatten()),
             _ => ("", None),
         };
         let Some([x, y, z]) = numbers else {
-            out.extend_from_slice(line);
+            out.extend_from_slice(statement.line);
             continue;
         };
         out.extend_from_slice(format!("{keyword} {x} {y} {z}").as_bytes());
         // Weights and colours.
-        for word in words.skip(3) {
-            out.push(b' ');
-            out.extend_from_slice(word.as_bytes());
-        }
-        out.extend_from_slice(&line[line.trim_ascii_end().len()..]);
+        statement.split(|words, comment| {
+            let behind = words
+                .skip(4)
+                .chain(Some(comment).filter(|text| !text.is_empty()));
+            for word in behind {
+                out.push(b' ');
+                out.extend_from_slice(word.as_bytes());
+            }
+        });
+        out.extend_from_slice(line_end(statement.line));
     }
     Ok(out)
 }

@@ -6,9 +6,8 @@ mod header;
 use body::Body;
 use header::{Element, Header};
 
-use super::{FormatError, Polygons, finite, level, side_of};
+use super::{FormatError, Polygons, finite, level, normals_like};
 use crate::TriangleMesh;
-use crate::vector::Vector;
 
 /// Elements that hold faces: polygons, and strips of triangles.
 const FACES: [&str; 2] = ["face", STRIPS];
@@ -139,14 +138,7 @@ pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Result<Vec<u8>, For
     let (element, mut body) = vertices(&header, bytes)?;
     let mut normals = Vec::new();
     if element.scalars(["nx", "ny", "nz"]).is_some() {
-        let old = decode(bytes)?;
-        let by_faces = old.vertex_normals().into_iter().map(Vector::from_array);
-        let read = old.normals.into_iter().flatten().map(Vector::from_array);
-        let side = side_of(by_faces.zip(read));
-        normals = moved.vertex_normals();
-        for normal in &mut normals {
-            *normal = normal.map(|x| side * x);
-        }
+        normals = normals_like(decode(bytes)?, moved);
     }
     let new = [
         (["x", "y", "z"], &moved.vertices),

@@ -15,9 +15,8 @@ const HEADER: usize = 84;
 const FACET: usize = 50;
 
 pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    // The length tells binary files from ASCII; their comment may begin with "solid" as well.
     let corners = match binary_length(bytes) {
-        Some((_, length)) if length == bytes.len() as u64 => binary(&bytes[HEADER..])?,
+        _ if is_binary(bytes) => binary(facets(bytes))?,
         _ if is_text(bytes) => ascii(&String::from_utf8_lossy(bytes))?,
         Some((count, expected)) => {
             return Err(FormatError::Length {
@@ -53,6 +52,20 @@ fn binary_length(bytes: &[u8]) -> Option<(u64, u64)> {
     Some((count, HEADER as u64 + FACET as u64 * count))
 }
 
+/// Whether all facets of a binary header are there: this tells binary files from ASCII, since the comment of a binary one may begin with
+/// "solid" as well, and letters in place of the number of facets announce more than a gigabyte. Bytes behind the facets are passed over.
+pub(super) fn is_binary(bytes: &[u8]) -> bool {
+    let length = bytes.len() as u64;
+    binary_length(bytes)
+        .is_some_and(|(count, expected)| expected == length || count > 0 && expected < length)
+}
+
+/// The bytes of the facets of a binary file.
+fn facets(bytes: &[u8]) -> &[u8] {
+    let length = binary_length(bytes).map_or(0, |(_, length)| length as usize);
+    &bytes[HEADER.min(length)..length]
+}
+
 fn is_text(bytes: &[u8]) -> bool {
     let start = bytes.trim_ascii_start();
     start.len() >= 5 && start[..5].eq_ignore_ascii_case(b"solid")
@@ -78,6 +91,8 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut facet = 0;
     let mut open = false;
     let (mut last, mut complete) = (0, false);
+    // Editors of old end texts with a control character, and blocks of a disk are filled up with zeros.
+    let text = text.trim_end_matches(['\0', '\x1a']);
     for (number, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
         let Some(keyword) = words.next() else {
@@ -122,8 +137,9 @@ fn ascii(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
 pub(super) fn rewrite(bytes: &[u8], moved: &TriangleMesh) -> Vec<u8> {
     let corners = |face: &[u32; 3]| moved.corners(*face);
     let normal = |face| scaled_normal(corners(face)).normalize_or_zero();
-    if binary_length(bytes).is_some_and(|(_, length)| length == bytes.len() as u64) {
+    if is_binary(bytes) {
         let mut out = bytes.to_vec();
+        // One face for each facet.
         for (facet, face) in out[HEADER..].chunks_exact_mut(FACET).zip(&moved.faces) {
             let vectors = std::iter::once(normal(face)).chain(corners(face));
             let numbers = vectors.flat_map(|v| v.to_array());

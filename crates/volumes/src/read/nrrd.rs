@@ -16,7 +16,7 @@ use crate::{FormatError, Volume};
 use entries::{Encoding, Entries, first_line};
 
 pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"NRRD000")
+    files::without_mark(bytes).starts_with(b"NRRD000")
 }
 
 /// The name of the file with the voxels, if these bytes are NRRD and it is another file.
