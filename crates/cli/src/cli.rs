@@ -11,7 +11,7 @@ use jobs::{
 };
 
 const EXIT_CODES: &str = "Exit codes: 0 success; 2 bad input or failure, with one line on standard error; 130 interrupted (Ctrl-C). \
-An interrupted run first finishes its step and stores it. `willmore resume` continues the run.";
+An interrupted run drops the step that it is making, and ends within two seconds. `willmore resume` continues it, with the same results.";
 
 /// Willmore flow of meshes, images and fields.
 ///

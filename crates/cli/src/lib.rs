@@ -26,6 +26,7 @@ pub fn main(arguments: &[OsString], mut console: Console) -> u8 {
         Err(Error::Help(help)) => console.write(help.to_string().as_bytes()),
         done => done,
     };
+    console.end();
     match done {
         Ok(()) => 0,
         Err(Error::Interrupted) => Interrupt::EXIT_CODE,
@@ -38,7 +39,11 @@ pub fn main(arguments: &[OsString], mut console: Console) -> u8 {
 
 fn execute(mut cli: Cli, console: &mut Console) -> Result<()> {
     let standard = Standard::open(&mut cli.command, cli.messages)?;
-    console.set(cli.messages, standard.output().is_some());
+    console.set(
+        cli.messages,
+        standard.output().is_some(),
+        standard.aliases(),
+    );
     match cli.command {
         Command::Run(command) => run::run(command.job(), standard.output(), console),
         Command::Resume(options) => resume::run(&options, console),

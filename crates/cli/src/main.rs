@@ -3,10 +3,14 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+use operators::memory::{self, OrRefuse};
 use willmore_cli::Console;
 
+#[global_allocator]
+static MEMORY: OrRefuse = OrRefuse;
+
 fn main() -> ExitCode {
-    operators::memory::keep_freed();
+    memory::keep_freed();
     let arguments: Vec<OsString> = std::env::args_os().collect();
     ExitCode::from(willmore_cli::main(&arguments, Console::standard()))
 }

@@ -16,6 +16,8 @@ use crate::error::{Result, refuse};
 #[derive(Default)]
 pub struct Standard {
     output: Option<PathBuf>,
+    /// The files by name, and what they stand for.
+    aliases: Vec<(String, &'static str)>,
     _folder: Option<TempDir>,
 }
 
@@ -35,9 +37,13 @@ impl Standard {
         }
         let folder = tempfile::tempdir();
         let folder = folder.map_err(files::Error::of("make a folder in", std::env::temp_dir()))?;
-        let place = |what: &str, format: &str| {
-            let name = format!("willmore-{}-{what}.{format}", std::process::id());
-            folder.path().join(name)
+        let mut aliases = Vec::new();
+        let mut place = |what: &'static str, format: &str| {
+            let path = folder
+                .path()
+                .join(format!("{}.{format}", what.replace(' ', "-")));
+            aliases.push((path.display().to_string(), what));
+            path
         };
         if reads {
             let mut bytes = Vec::new();
@@ -46,7 +52,7 @@ impl Standard {
             if bytes.is_empty() {
                 refuse!("standard input is empty: pipe a mesh, an image or a field into it");
             }
-            let path = place("input", kind(&bytes));
+            let path = place("standard input", kind(&bytes));
             std::fs::write(&path, &bytes).map_err(files::Error::of("write", &path))?;
             input.input = Some(path.as_path().into());
         }
@@ -62,11 +68,12 @@ impl Standard {
                 Some(input) => jobs::usual_format(input)?,
                 None => return Err(jobs::Error::NoInput.into()),
             };
-            *save = place("output", &format);
+            *save = place("standard output", &format);
             output = Some(save.clone());
         }
         Ok(Self {
             output,
+            aliases,
             _folder: Some(folder),
         })
     }
@@ -74,6 +81,11 @@ impl Standard {
     /// The file that stands for standard output, if that is a result.
     pub fn output(&self) -> Option<&Path> {
         self.output.as_deref()
+    }
+
+    /// The files by name, with what messages call them.
+    pub fn aliases(&self) -> Vec<(String, &'static str)> {
+        self.aliases.clone()
     }
 
     /// Writes the result to standard output, if it goes there.

@@ -1,6 +1,6 @@
 //! Kills at random moments, each followed by a resumption to the same bytes.
 use std::path::Path;
-use std::process::Child;
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use crate::common::{assert_same, committed, run, start, text, wait_for, with_output};
@@ -136,4 +136,40 @@ fn six_kills_at_random_moments() {
 #[ignore = "takes minutes: the long form of the one above"]
 fn twenty_kills_at_random_moments() {
     kills_at_random_moments(20);
+}
+
+/// The step that is being made takes seconds and is dropped; what is there resumes to the bytes of the run without a signal.
+#[test]
+fn a_signal_ends_the_program_within_two_seconds() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "flow builtin:torus --cells 48 --tau 1e-5 --steps 2 --storage dense";
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let clock = Instant::now();
+    let whole = run(folder.path(), &with_output(&arguments, "whole"));
+    assert!(whole.status.success(), "{}", text(&whole.stderr));
+    let whole_time = clock.elapsed();
+    let mut dropped = 0;
+    for (signal, part) in [("-TERM", 0.3), ("-INT", 0.5), ("-TERM", 0.8)] {
+        let name = format!("ended{part}");
+        let path = folder.path().join(&name);
+        let mut child = start(folder.path(), &with_output(&arguments, &name));
+        // From here on signals are caught.
+        wait_for(&path, 0, &mut child);
+        std::thread::sleep(whole_time.mul_f64(part));
+        let id = child.id().to_string();
+        let clock = Instant::now();
+        Command::new("kill").args([signal, &id]).status().unwrap();
+        let code = child.wait().unwrap().code();
+        assert!(clock.elapsed() < Duration::from_secs(2));
+        if code == Some(0) {
+            // It was over.
+            continue;
+        }
+        assert_eq!(code, Some(130));
+        dropped += 1;
+        let resumed = run(folder.path(), &["resume", &name]);
+        assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+        assert_same(&path, &folder.path().join("whole"));
+    }
+    assert!(dropped > 0, "no signal came in time");
 }

@@ -1,7 +1,7 @@
 //! A person's own files: parts of a mesh that stay, standard input and output, fields on other grids.
 
 use std::fs::{self, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use chacha20::ChaCha8Rng;
 use geometry::shapes::Ball;
@@ -213,14 +213,10 @@ fn meshes_and_pictures_go_through_pipes() {
             assert!(mesh.faces.len() > 100, "{file}");
         }
     }
-    let left = fs::read_dir(std::env::temp_dir()).unwrap();
-    let of_this = |name: &str| name.starts_with("willmore-") && name.contains("put.");
-    // Other tests may be at it in this moment, but not with these.
-    let left = left.filter(|entry| {
-        let name = entry.as_ref().unwrap().file_name();
-        of_this(&name.to_string_lossy()) && name.to_string_lossy().ends_with("input.stl")
-    });
-    assert_eq!(left.count(), 0);
+    let input = fs::read_to_string(at("run-in.stl/config.toml")).unwrap();
+    let input = input.lines().find_map(|line| line.strip_prefix("input = "));
+    let input = PathBuf::from(input.unwrap().trim_matches('"'));
+    assert!(!input.parent().unwrap().exists(), "{}", input.display());
     let stored = fs::read_to_string(at("run-in.ply/config.toml")).unwrap();
     assert!(!stored.contains("save"), "{stored}");
     let check = program(folder.path())
@@ -252,6 +248,23 @@ fn meshes_and_pictures_go_through_pipes() {
     );
     let empty = run(folder.path(), &["flow", "-"]);
     assert!(text(&empty.stderr).contains("standard input is empty"));
+    fs::write(at("open.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").unwrap();
+    fs::write(at("words.txt"), "no mesh\n").unwrap();
+    for (file, expected) in [
+        (
+            "words.txt",
+            "error: standard input cannot be read as a mesh: the file has 0 vertices and no faces",
+        ),
+        ("open.off", "error: the surface is open"),
+    ] {
+        let refused = program(folder.path())
+            .args(["fair", "-"])
+            .stdin(File::open(at(file)).unwrap())
+            .output()
+            .unwrap();
+        let error = text(&refused.stderr);
+        assert!(error.starts_with(expected), "{error}");
+    }
 }
 
 #[test]
@@ -280,4 +293,52 @@ fn fields_are_taken_to_other_grids() {
     }
     let few = run(folder.path(), &["flow", "disc.npy", "--cells", "2"]);
     assert!(text(&few.stderr).contains("--cells 2 resolves nothing"));
+}
+
+/// Names of files are bytes, which messages show as well as they can.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_no_text_are_names() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    let named = |before: &str, after: &str| {
+        let bytes = [before.as_bytes(), b"caf\xe9", after.as_bytes()].concat();
+        OsString::from_vec(bytes)
+    };
+    let run = |arguments: &[OsString]| {
+        let output = program(folder.path()).args(arguments).output().unwrap();
+        (output.status.code(), text(&output.stderr))
+    };
+    let typed = |text: &str| -> Vec<OsString> { text.split(' ').map(Into::into).collect() };
+    let (mesh, moved, output) = (named("", ".ply"), named("", "-2.ply"), named("", "-run"));
+    let keep = named("keep-", ".ply");
+    let mut sample = typed("sample builtin:sphere --cells 24 --save");
+    sample.push(mesh.clone());
+    assert_eq!(run(&sample), (Some(0), String::new()));
+    let mut sample = typed("sample ball:0.2,0,0,0.1 --cells 24 --save");
+    sample.push(keep.clone());
+    assert_eq!(run(&sample), (Some(0), String::new()));
+    let mut fair = typed("fair --cells 24 --noise 0.01 --steps 1 --quiet --save");
+    fair.extend([
+        moved.clone(),
+        "--output".into(),
+        output.clone(),
+        "--keep".into(),
+        keep,
+        mesh,
+    ]);
+    assert_eq!(run(&fair), (Some(0), String::new()));
+    let saved = fs::read(folder.path().join(&moved)).unwrap();
+    assert!(saved.starts_with(b"ply"));
+    fs::remove_file(folder.path().join(&moved)).unwrap();
+    let mut resume = typed("resume --steps 2 --quiet");
+    resume.push(output);
+    assert_eq!(run(&resume), (Some(0), String::new()));
+    assert!(folder.path().join(&moved).exists());
+    let mut missing = typed("flow");
+    missing.push(named("no", ".ply"));
+    let (code, error) = run(&missing);
+    assert_eq!(code, Some(2));
+    assert!(error.contains("nocaf\u{fffd}.ply: No such file"), "{error}");
 }

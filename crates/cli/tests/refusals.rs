@@ -26,6 +26,42 @@ fn what_does_not_fit_into_memory_is_refused_before_it_takes_long() {
     assert!(!folder.path().join("run").exists());
 }
 
+/// Whatever the limit is, there is one line and the exit code 2, and what was stored goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_the_system_refuses_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |kib: usize, arguments: &str| {
+        let program = env!("CARGO_BIN_EXE_willmore");
+        let command = format!("ulimit -v {kib}; exec {program} {arguments} --quiet");
+        let mut shell = std::process::Command::new("sh");
+        shell.current_dir(folder.path()).args(["-c", &command]);
+        shell.output().unwrap()
+    };
+    let mut refused = 0;
+    for megabytes in [200, 260, 320, 400] {
+        let flow = format!("flow builtin:cube --cells 64 --steps 1 --output run{megabytes}");
+        let output = limited(megabytes << 10, &flow);
+        let stderr = text(&output.stderr);
+        if output.status.success() {
+            continue;
+        }
+        refused += 1;
+        assert_eq!(output.status.code(), Some(2), "{megabytes}: {stderr}");
+        assert_eq!(stderr.lines().count(), 1, "{megabytes}: {stderr}");
+        assert!(
+            stderr.contains("does not fit into memory") || stderr.contains("GB of memory"),
+            "{megabytes}: {stderr}"
+        );
+        let name = format!("run{megabytes}");
+        if folder.path().join(&name).exists() {
+            let resumed = run(folder.path(), &["resume", &name]);
+            assert!(resumed.status.success(), "{}", text(&resumed.stderr));
+        }
+    }
+    assert!(refused > 0, "all of it fitted");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_outcome_that_cannot_be_printed_is_a_failure() {

@@ -8,7 +8,7 @@ use geometry::{
 };
 use serde::{Deserialize, Serialize};
 use solver::{
-    Candidate, DirectRecord, Error, Memory, Problem, Scheme, State, StepRecord, StepSize,
+    Cancel, Candidate, DirectRecord, Error, Memory, Problem, Scheme, State, StepRecord, StepSize,
 };
 
 use crate::step::{DirectSteps, Needed};
@@ -53,6 +53,15 @@ struct Runs {
     whole: Vec<f64>,
     half: Vec<f64>,
     reach: f64,
+}
+
+/// What holds for all parts of a step.
+#[derive(Clone, Copy)]
+struct Parts<'a> {
+    /// The longest, over the fourth power of the reach.
+    longest: f64,
+    free: Free<'a>,
+    cancel: &'a Cancel,
 }
 
 /// Where distances may change; all others stay.
@@ -129,24 +138,39 @@ impl<const D: usize> DirectSteps<D> {
     }
 
     /// Both runs after a part of a step.
-    fn both(&mut self, runs: &Runs, tau: f64, free: Free<'_>, needed: Needed) -> Runs {
+    fn both(
+        &mut self,
+        runs: &Runs,
+        tau: f64,
+        parts: Parts<'_>,
+        needed: Needed,
+    ) -> Result<Runs, Error> {
+        let Parts { free, cancel, .. } = parts;
+        cancel.check()?;
         let whole = self.step_as(&runs.whole, tau, needed);
+        cancel.check()?;
         let middle = self.step_as(&runs.half, 0.5 * tau, Needed::Near);
         let middle = free.of(middle.distances, &runs.half);
+        cancel.check()?;
         // All distances, for the reach.
         let half = self.step(&middle, 0.5 * tau);
-        Runs {
+        Ok(Runs {
             reach: half.reach(),
             whole: free.of(whole.distances, &runs.whole),
             half: free.of(half.distances, &runs.half),
-        }
+        })
     }
 
     /// Both runs after a time step, and in how many parts it was made.
-    fn advance(&mut self, mut runs: Runs, tau: f64, longest: f64, free: Free<'_>) -> (Runs, usize) {
-        let (mut left, mut parts) = (tau, 0);
+    fn advance(
+        &mut self,
+        mut runs: Runs,
+        tau: f64,
+        parts: Parts<'_>,
+    ) -> Result<(Runs, usize), Error> {
+        let (mut left, mut count) = (tau, 0);
         while left > 0.0 {
-            let longest = (longest * runs.reach.powi(4)).max(self.shortest());
+            let longest = (parts.longest * runs.reach.powi(4)).max(self.shortest());
             let part = left / (left / longest).ceil().max(1.0);
             // The last part is all that is left, whatever rounding says.
             left = if part < left { left - part } else { 0.0 };
@@ -155,10 +179,10 @@ impl<const D: usize> DirectSteps<D> {
             } else {
                 Needed::All
             };
-            runs = self.both(&runs, part, free, needed);
-            parts += 1;
+            runs = self.both(&runs, part, parts, needed)?;
+            count += 1;
         }
-        (runs, parts)
+        Ok((runs, count))
     }
 }
 
@@ -259,14 +283,18 @@ impl<const D: usize> Scheme<D> for Direct<D> {
         let clock = Instant::now();
         Self::check(problem, from)?;
         let (eps, free) = (problem.params.eps, Free(problem.region.as_deref()));
-        let longest = self.params.longest;
+        let parts = Parts {
+            longest: self.params.longest,
+            free,
+            cancel: &problem.cancel,
+        };
         let before = from.stored()?;
         let steps = self.steps(problem.grid);
         let runs = match remembered(from, eps)? {
             Some(runs) => runs,
             None => steps.start(&before, eps, free),
         };
-        let (runs, parts) = steps.advance(runs, size.tau, longest, free);
+        let (runs, parts) = steps.advance(runs, size.tau, parts)?;
         let level = steps.level(&runs.extrapolated());
 
         let not_finite = |_| Error::NonFinite {

@@ -49,6 +49,9 @@ pub enum Error {
          same box"
     )]
     Incomparable { cells: usize, reference: usize },
+    /// The step was not wanted any more before it was made; the run stays where it was.
+    #[error("{case}: the step was cancelled")]
+    Cancelled { case: String },
     /// A stored run of another case, one that is over, or one that cannot be read.
     #[error("the run in {} cannot go on: {reason}", path.display())]
     Stored { path: PathBuf, reason: String },

@@ -8,7 +8,7 @@ use geometry::measure::l2_distance;
 use geometry::{Field, NodeSet, PhaseField, Stored, require};
 use operators::ComputeDevice;
 use serde_json::Value;
-use solver::{Candidate, Domain, Problem, Scheme, State, StepSize, TermCheck};
+use solver::{Cancel, Candidate, Domain, Problem, Scheme, State, StepSize, TermCheck};
 
 use crate::parts::{self, Parts};
 use crate::record::Values;
@@ -35,6 +35,21 @@ pub struct Run<const D: usize> {
     pub(crate) start: Values,
     pub(crate) records: Vec<Record>,
     ended: Option<Stop>,
+}
+
+/// The controller of a case as these records leave it.
+fn controller_after<const D: usize>(
+    case: &Case<D>,
+    records: &[Record],
+) -> Result<Box<dyn Controller<D>>, Error> {
+    let mut controller: Box<dyn Controller<D>> = match &case.own.controller {
+        Some(make) => make(case)?,
+        None => Box::new(StepControl::new(case)?),
+    };
+    for record in records {
+        controller.accept(record)?;
+    }
+    Ok(controller)
 }
 
 impl<const D: usize> Run<D> {
@@ -71,13 +86,7 @@ impl<const D: usize> Run<D> {
                 |n| n < 1.0,
             )?;
         }
-        let mut controller: Box<dyn Controller<D>> = match &case.own.controller {
-            Some(make) => make(&case)?,
-            None => Box::new(StepControl::new(&case)?),
-        };
-        for record in &records {
-            controller.accept(record)?;
-        }
+        let controller = controller_after(&case, &records)?;
         let Parts {
             problem,
             start: state,
@@ -124,7 +133,7 @@ impl<const D: usize> Run<D> {
     /// Makes one step: of the next size, or of a smaller one if the controller does not take that. None once a stop rule holds.
     ///
     /// # Errors
-    /// [`Error::Step`], [`Error::TooStiff`], and those of measures: the run stays where it was.
+    /// [`Error::Step`], [`Error::TooStiff`], [`Error::Cancelled`], and those of measures: the run stays where it was.
     pub fn step(&mut self) -> Result<Option<&Record>, Error> {
         if self.ended.is_some() {
             return Ok(None);
@@ -149,6 +158,11 @@ impl<const D: usize> Run<D> {
         Ok(self.records.last())
     }
 
+    /// Ends the step that is being made, with [`Error::Cancelled`], as soon as it is not wanted any more.
+    pub fn set_cancel(&mut self, cancel: Cancel) {
+        self.problem.set_cancel(cancel);
+    }
+
     /// Makes so many time steps, or fewer if a stop rule ends them: an iterator over their records, of which those of a step that is made in
     /// parts are several. Steps are made as it goes on.
     pub fn take(&mut self, steps: usize) -> impl Iterator<Item = Result<Record, Error>> {
@@ -166,6 +180,12 @@ impl<const D: usize> Run<D> {
         loop {
             let size = self.controller.next();
             let made = self.scheme.step(&self.problem, &self.state, size);
+            if matches!(made, Err(solver::Error::Cancelled)) {
+                // It may have seen attempts that are made again later.
+                self.controller = controller_after(&self.case, &self.records)?;
+                let case = self.case.title();
+                return Err(Error::Cancelled { case });
+            }
             let verdict = self.controller.judge(&self.state, made.as_ref());
             match (verdict.map_err(|source| self.failed(source))?, made) {
                 (Verdict::Accept(attempts), Ok(candidate)) => {

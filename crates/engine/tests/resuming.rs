@@ -1,6 +1,7 @@
 //! The same bytes after interruptions, and what cannot be resumed.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::{TAU, case, device, disc, divided, finished, square};
 use crate::held::driven;
@@ -10,6 +11,7 @@ use engine::{
 };
 use runs::{Interrupt, RunDirectory};
 use serde_json::Value;
+use solver::Cancel;
 
 /// Asks for an end after so many minimizations.
 struct After<'a>(usize, &'a Interrupt);
@@ -298,6 +300,81 @@ fn a_direct_run_continues_with_the_same_bytes() {
     assert!(refused.to_string().contains("held sizes"), "{refused}");
 }
 
+/// A run to its end, each step of which is cancelled at its first question, at one so many later, and so on, until it ends before that; and how often
+/// that was.
+fn cancelled(case: &Case<2>, every: usize) -> (Run<2>, usize) {
+    let mut run = Run::new(case.clone(), &device()).unwrap();
+    let (mut all, mut of_step) = (0, 0);
+    while run.ended().is_none() {
+        let (asked, last) = (AtomicUsize::new(0), every * of_step);
+        run.set_cancel(Cancel::when(move || {
+            asked.fetch_add(1, Ordering::Relaxed) == last
+        }));
+        match run.step() {
+            Ok(_) => of_step = 0,
+            Err(Error::Cancelled { .. }) => (all, of_step) = (all + 1, of_step + 1),
+            Err(error) => panic!("{error}"),
+        }
+    }
+    (run, all)
+}
+
+#[test]
+fn steps_that_are_cancelled_anywhere_are_made_again_with_the_same_bytes() {
+    let mut direct = case(Flow::Willmore, Method::Hybrid, square(128));
+    direct.steps = TimeSteps::direct(StepRule::ByEnergy(None), DirectParams::default());
+    let mut controlled = case(Flow::Willmore, Method::Hybrid, square(128));
+    controlled.steps = TimeSteps {
+        order: Order::Controlled(ErrorControl::default()),
+        ..StepRule::Constant(TAU).into()
+    };
+    controlled.stops = vec![Stop::Time(0.1 * TAU)];
+    let mut held = case(Flow::Willmore, Method::Hybrid, square(128));
+    held.steps = StepRule::ByEnergy(None).into();
+    held.held.volume = Some(Target::keep(0.16));
+    // Its steps begin on the half grid.
+    let mut half = case(Flow::Willmore, Method::Hybrid, disc(256, 0.2));
+    for case in [&mut direct, &mut held, &mut half] {
+        case.stops = vec![Stop::Steps(2)];
+    }
+    for (case, every) in [(direct, 2), (controlled, 31), (held, 31), (half, 13)] {
+        let whole = finished(case.clone());
+        let (run, count) = cancelled(&case, every);
+        assert!(count > whole.records().len(), "{every}: {count}");
+        assert_eq!(run.records().len(), whole.records().len());
+        assert_eq!(run.field(), whole.field());
+        let sizes = |run: &Run<2>| -> Vec<(f64, u32)> {
+            let records = run.records().iter();
+            records
+                .map(|record| (record.tau, record.halvings))
+                .collect()
+        };
+        assert_eq!(sizes(&run), sizes(&whole));
+    }
+}
+
+/// The step during which the interruption comes is dropped, and the state before it is kept.
+#[test]
+fn an_interruption_drops_the_step_that_is_being_made() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("run");
+    let whole = case(Flow::Willmore, Method::Hybrid, disc(128, 0.2));
+    let reference = finished(whole.clone());
+    let interrupt = Interrupt::never();
+    interrupt.request();
+    let every = Checkpoints::EverySteps(3);
+    let mut run = Run::new(whole.clone(), &device()).unwrap();
+    let mut store = Store::create(&folder, &[], &run, Value::from("notes"), every).unwrap();
+    let ending = run.advance(Some(&mut store), &mut [], &interrupt).unwrap();
+    assert_eq!((ending, run.records().len()), (None, 0));
+    drop(store);
+    let stored = RunDirectory::open(&folder).unwrap();
+    let (mut store, mut run) = Store::resume(stored, whole, &device(), every).unwrap();
+    run.advance(Some(&mut store), &mut [], &Interrupt::never())
+        .unwrap();
+    assert_eq!(run.field(), reference.field());
+}
+
 /// A region, steps by the energy and an application's notes: from the checkpoint alone.
 #[test]
 fn a_case_is_built_from_its_checkpoint() {
@@ -313,8 +390,9 @@ fn a_case_is_built_from_its_checkpoint() {
     let mut run = engine::Run::new(inpainting.clone(), &device()).unwrap();
     let mut store = Store::create(&folder, &[], &run, Value::from("notes"), every).unwrap();
     let interrupt = Interrupt::never();
-    interrupt.request();
-    let ending = run.advance(Some(&mut store), &mut [], &interrupt).unwrap();
+    let mut first = After(1, &interrupt);
+    let ending = run.advance(Some(&mut store), &mut [&mut first], &interrupt);
+    let ending = ending.unwrap();
     assert_eq!((ending, run.records().len()), (None, 1));
     drop(store);
 

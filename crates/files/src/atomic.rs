@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{Disk, Error, FileSystem};
 
@@ -14,15 +14,33 @@ const BUFFER: usize = 1 << 16;
 /// Writes a file through a temporary one in the same folder.
 ///
 /// The temporary file is removed when something fails, also when `write` panics. The new file has
-/// the permissions of an ordinary new file. The action of an error of `write` is `write`.
+/// the permissions of an ordinary new file. The action of an error of `write` is `write`. Of a
+/// symbolic link, the file to which it leads is written, and the link stays.
 pub fn write_atomically(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
-    write_atomically_on(&Disk, path, write)
+    let path = path.as_ref();
+    let target = target(path).map_err(Error::of("follow the links of", path))?;
+    write_atomically_on(&Disk, target, write)
 }
 
-/// [`write_atomically`] on another file system than the disk itself.
+/// The file to which a path leads through symbolic links, whether it is there or not.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if !target.is_symlink() {
+            return Ok(target);
+        }
+        // A relative link is relative to its own folder.
+        target = folder_of(&target).join(std::fs::read_link(&target)?);
+    }
+    Err(io::Error::other("there are too many of them"))
+}
+
+/// [`write_atomically`] on another file system than the disk itself, and in place of symbolic links.
 pub fn write_atomically_on(
     file_system: &dyn FileSystem,
     path: impl AsRef<Path>,

@@ -128,3 +128,34 @@ fn files_are_readable_like_any_other() {
     let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode(&ours), mode(&plain));
 }
+
+/// As editors and shells do it: the link stays, and what it leads to is written.
+#[cfg(unix)]
+#[test]
+fn a_file_is_written_through_links() {
+    use std::os::unix::fs::symlink;
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    fs::create_dir(at("folder")).unwrap();
+    fs::write(at("folder/file"), "old").unwrap();
+    symlink("folder/file", at("link")).unwrap();
+    symlink(at("link"), at("link to a link")).unwrap();
+    symlink("folder/new", at("dangling")).unwrap();
+    symlink("round", at("round")).unwrap();
+    let write = |name: &str| files::write_atomically(at(name), |out| out.write_all(b"new"));
+    for (link, file) in [
+        ("link to a link", "folder/file"),
+        ("dangling", "folder/new"),
+    ] {
+        write(link).unwrap();
+        assert!(at(link).is_symlink() && !at(file).is_symlink());
+        assert_eq!(fs::read_to_string(at(file)).unwrap(), "new");
+    }
+    assert!(at("link").is_symlink());
+    assert_eq!(names(&at("folder")), ["file", "new"]);
+    let error = write("round").unwrap_err().to_string();
+    assert!(
+        error.starts_with("could not follow the links of"),
+        "{error}"
+    );
+}

@@ -1,7 +1,7 @@
 //! What a job tells while it runs, as values: whoever starts it decides how to show them.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use pages::five_digits;
 use runs::Interrupt;
@@ -22,7 +22,10 @@ pub trait Watcher: Sync {
         Box::new(Untold)
     }
 
-    /// The flag that ends the steps of a flow after the current one; asked for before the first step.
+    /// The run of a job is stored in a folder from now on, and can be resumed from there; its result goes to a file besides.
+    fn stores(&self, _command: &'static str, _folder: &Path, _save: Option<&Path>) {}
+
+    /// The flag that ends the steps of a flow, and drops the one that is being made; asked for before the first step.
     ///
     /// # Errors
     /// [`runs::Error::Signals`] where signals cannot be caught.

@@ -6,7 +6,7 @@ use crate::keep;
 use crate::options::{FairOptions, WillmoreOptions};
 use crate::own::OwnMesh;
 use crate::parts::{DETAIL, MAX_DISTANCE};
-use crate::paths::absolute;
+use crate::paths::{absolute, to_text};
 use crate::prelude::*;
 use crate::values::SizeTarget;
 
@@ -114,7 +114,7 @@ impl FairOptions {
             return Err(Refusal::RepairWithoutRemesh.into());
         }
         if let Some(mask) = self.keep.as_deref().and_then(keep::mask) {
-            self.keep = Some(absolute(mask)?.to_string_lossy().into_owned());
+            self.keep = Some(to_text(absolute(mask)?.as_os_str()));
         }
         let bytes = if repairs {
             let repaired = closed(file, true, watcher)?;

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::borrow::Cow;
 use std::convert::Infallible;
+use std::ffi::OsString;
 use std::fmt;
 use std::io::Read;
 use std::sync::Arc;
@@ -10,6 +11,7 @@ use std::sync::Arc;
 use geometry::npy::Array;
 use volumes::Volume;
 
+use crate::paths::{of_text, to_text};
 use crate::prelude::*;
 
 /// More bytes than the header of an array has.
@@ -18,6 +20,7 @@ const HEAD: u64 = 1 << 14;
 /// The input of a job: a file, a built-in shape or a region by its name, or the contents of a file in memory.
 #[derive(Clone)]
 pub struct Input {
+    /// The [text](crate::paths::to_text) of a name that may be none.
     name: String,
     contents: Option<Contents>,
 }
@@ -93,6 +96,11 @@ impl Input {
         &self.name
     }
 
+    /// Its name as the path of a file.
+    pub(crate) fn path(&self) -> PathBuf {
+        of_text(&self.name).into()
+    }
+
     pub(crate) fn is_in_memory(&self) -> bool {
         self.contents.is_some()
     }
@@ -113,7 +121,7 @@ impl Input {
             path: if self.is_in_memory() {
                 self.name.clone().into()
             } else {
-                crate::paths::absolute(&self.name)?
+                crate::paths::absolute(self.path())?
             },
             contents: self.contents.clone(),
         })
@@ -121,7 +129,7 @@ impl Input {
 
     /// A file has the same name wherever the program may run later.
     pub(crate) fn rename(&mut self, path: &Path) {
-        self.name = path.to_string_lossy().into_owned();
+        self.name = to_text(path.as_os_str());
     }
 }
 
@@ -142,7 +150,13 @@ impl From<String> for Input {
 
 impl From<&Path> for Input {
     fn from(path: &Path) -> Self {
-        path.to_string_lossy().into_owned().into()
+        to_text(path.as_os_str()).into()
+    }
+}
+
+impl From<OsString> for Input {
+    fn from(name: OsString) -> Self {
+        to_text(&name).into()
     }
 }
 
@@ -156,7 +170,7 @@ impl FromStr for Input {
 
 impl fmt::Display for Input {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.name)
+        self.path().display().fmt(f)
     }
 }
 

@@ -194,9 +194,9 @@ impl Source {
                 Some(2) => return Err(Refusal::LabelsInThePlane(file.path).into()),
                 Some(_) => Self::Volume(file),
             },
-            "vti" => return Err(Error::ParaView(name.to_owned())),
+            "vti" => return Err(Error::ParaView(input.to_string())),
             "nii" | "gz" | "nrrd" | "nhdr" | "mgh" | "mgz" | "mrc" | "map" => Self::Volume(file),
-            _ => return Err(Error::UnknownInput(name.to_owned())),
+            _ => return Err(Error::UnknownInput(input.to_string())),
         })
     }
 

@@ -1,14 +1,20 @@
 //! What `keep` leaves where it is.
 
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use rstar::RTree;
 
-use crate::paths::{MESHES, extension};
+use crate::paths::{MESHES, extension, of_text, to_text};
 use crate::prelude::*;
 
 /// The file of the mask, if it is one.
-pub fn mask(text: &str) -> Option<&Path> {
-    let path = Path::new(text);
-    MESHES.contains(&&*extension(path)).then_some(path)
+pub fn mask(text: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(of_text(text));
+    MESHES.contains(&&*extension(&path)).then_some(path)
+}
+
+/// What is typed, as the text of a name that may be that of a file.
+pub fn parser() -> impl TypedValueParser<Value = String> {
+    OsStringValueParser::new().map(|name| to_text(&name))
 }
 
 /// The distance of what stays, from what was typed, with the bytes of the mask, for a mesh, the bytes of its file and the name of that. What is

@@ -2,6 +2,7 @@
 
 use clap::{Args, Command};
 
+use crate::paths::of_text;
 use crate::prelude::*;
 
 /// The options with these names and values, as the program takes them: a name is that of a field, and an option without a value is a flag.
@@ -26,10 +27,10 @@ pub fn options_of<'a, O: Args>(
 ) -> Result<O> {
     let typed = named.into_iter().map(|(name, value)| {
         let option = name.replace('_', "-");
-        match value {
+        of_text(&match value {
             Some(value) => format!("--{option}={value}"),
             None => format!("--{option}"),
-        }
+        })
     });
     let program = O::augment_args(Command::new("options").no_binary_name(true));
     let program = program.allow_negative_numbers(true).disable_help_flag(true);

@@ -5,7 +5,8 @@ use engine::Storage;
 use model::Ratios;
 
 use crate::file::Input;
-use crate::paths::MESHES;
+use crate::keep;
+use crate::paths::{self, MESHES};
 use crate::prelude::*;
 use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
 
@@ -142,6 +143,7 @@ pub struct OperatorOptions {
 
     /// Use the network in this file, which `willmore train` has made
     #[arg(long, value_name = "FILE", help_heading = ADVANCED, hide_short_help = true)]
+    #[serde(serialize_with = "paths::serialized")]
     pub network: Option<PathBuf>,
 
     /// Part of the phase field that is stored: dense, bricks or auto [default: auto]
@@ -246,6 +248,7 @@ pub struct RunOptions {
     ///
     /// In 3D the result is a mesh (.ply, .obj, .stl, .off), in 2D a picture (.png, .svg). The name - means standard output.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    #[serde(serialize_with = "paths::serialized")]
     pub save: Option<PathBuf>,
 
     /// Whether files and runs are overwritten.
@@ -454,7 +457,7 @@ pub struct FairOptions {
     ///
     /// A box is box:x0,y0,z0,x1,y1,z1, and a ball is ball:x,y,z,r. A closed mesh is a file (.obj, .stl, .ply, .off). All three are in the coordinates of
     /// the input. colour:ff0000 means the vertices of this colour.
-    #[arg(long, value_name = "REGION", allow_hyphen_values = true, help_heading = FLOW)]
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true, value_parser = keep::parser(), help_heading = FLOW)]
     pub keep: Option<String>,
 
     /// Write a new mesh; otherwise the result is the mesh of the input with moved vertices

@@ -79,9 +79,10 @@ impl OwnMesh {
     }
 
     /// The path of the mask, if that is a mesh, and the name of its copy.
-    fn mask(&self) -> Option<(&Path, String)> {
+    fn mask(&self) -> Option<(PathBuf, String)> {
         let path = keep::mask(self.keep.as_deref()?)?;
-        Some((path, format!("keep.{}", extension(path))))
+        let copy = format!("keep.{}", extension(&path));
+        Some((path, copy))
     }
 
     /// Takes the bytes of a file; noise that is not a number is estimated.

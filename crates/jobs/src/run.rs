@@ -12,7 +12,6 @@ use solver::StepEstimates;
 
 use crate::events::Progress;
 use crate::faired::{Faired, MeshReport};
-use crate::file::Input;
 use crate::made::{Made, Shape};
 use crate::notes::{About, NetworkNote, RunNotes};
 use crate::options::{InputOptions, RunOptions};
@@ -71,6 +70,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
     /// From the last checkpoint to the end.
     pub fn go_on(&self, mut store: Store, mut run: Run<D>) -> Result<Outcome> {
         let folder = store.directory().path().to_owned();
+        (self.watcher).stores(self.command, &folder, self.save.as_deref());
         let clock = Instant::now();
         let ended = self.advance(Some(&mut store), &mut run)?;
         let seconds = clock.elapsed().as_secs_f64();
@@ -397,10 +397,10 @@ pub fn make_way(folder: &Path, input: &InputOptions) -> Result<()> {
         Err(_) => return Ok(()),
     };
     let whole = |path: &Path| path.canonicalize().ok();
-    if let (Some(input), Some(folder)) = (input.input.as_ref().map(Input::name), whole(folder))
-        && whole(Path::new(input)).is_some_and(|input| input.starts_with(folder))
+    if let (Some(input), Some(folder)) = (&input.input, whole(folder))
+        && whole(&input.path()).is_some_and(|input| input.starts_with(folder))
     {
-        return Err(Error::InputInTheRun(input.to_owned()));
+        return Err(Error::InputInTheRun(input.to_string()));
     }
     stored.tidy()?;
     if let Some(other) = foreign(&stored) {

@@ -4,6 +4,7 @@ use volumes::{Body, Inside, Volume};
 
 use crate::file::File;
 use crate::options::InputOptions;
+use crate::paths::{of_text, to_text};
 use crate::prelude::*;
 use crate::values::Label;
 
@@ -72,10 +73,10 @@ pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
 
 /// The name of a file or folder for one of several labels.
 pub fn named(path: &Path, label: i64) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = to_text(path.file_name().unwrap_or_default());
     let (stem, extension) = match name.strip_suffix(".nii.gz") {
         Some(stem) => (stem, ".nii.gz"),
         None => name.split_at(name.rfind('.').unwrap_or(name.len())),
     };
-    path.with_file_name(format!("{stem}-label{label}{extension}"))
+    path.with_file_name(of_text(&format!("{stem}-label{label}{extension}")))
 }

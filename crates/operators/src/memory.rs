@@ -1,6 +1,70 @@
-//! Memory of the process: what is kept for later use, and how much is in use.
+//! Memory of the process: what is kept for later use, how much is in use, and what happens where there is none.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::Write;
+use std::process;
 
 use crate::fft::Real;
+
+/// The allocator of the system, for programs: where the system refuses memory, the program says so in one line on standard error and ends with
+/// the exit code 2. Without it a program of Rust aborts, and shows a trace of its calls.
+pub struct OrRefuse;
+
+/// The exit code of a program to which the system refused memory.
+pub const REFUSED: i32 = 2;
+
+/// Ends the program. Nothing here allocates.
+#[cold]
+fn refuse(size: usize) -> ! {
+    let mut line = [0; 256];
+    let mut rest = &mut line[..];
+    // It is long enough.
+    let _ = writeln!(
+        rest,
+        "error: this does not fit into memory: the system refuses {size} bytes more; take fewer cells, or let the program have more memory. A run that \
+         had begun goes on with: willmore resume"
+    );
+    let left = rest.len();
+    let length = line.len() - left;
+    let _ = std::io::stderr().write_all(&line[..length]);
+    process::exit(REFUSED)
+}
+
+#[allow(unsafe_code, reason = "an allocator is unsafe")]
+// SAFETY: all of it is that of the system, which has the contract of `GlobalAlloc`; a null pointer is not returned.
+unsafe impl GlobalAlloc for OrRefuse {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's, as for all functions here.
+        let block = unsafe { System.alloc(layout) };
+        if block.is_null() {
+            refuse(layout.size());
+        }
+        block
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above.
+        let block = unsafe { System.alloc_zeroed(layout) };
+        if block.is_null() {
+            refuse(layout.size());
+        }
+        block
+    }
+
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: as above.
+        let block = unsafe { System.realloc(block, layout, size) };
+        if block.is_null() {
+            refuse(size);
+        }
+        block
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
 
 /// Tells the allocator of glibc to keep memory that was freed. By default it returns vectors of megabytes to the system at once
 /// and gets them back page by page, which costs flows half of their time. Other allocators keep memory anyway. To be called first in a
@@ -45,9 +109,22 @@ pub fn peak_mib() -> Option<f64> {
     Some(kib("/proc/self/status", "VmHWM:")? / 1024.0)
 }
 
-/// Bytes of memory that programs could still take without swapping, where the system tells.
+/// Bytes of memory that this process could still take without swapping, and within the limit of its address space (`ulimit -v`), where the system
+/// tells.
 pub fn available() -> Option<f64> {
-    Some(kib("/proc/meminfo", "MemAvailable:")? * 1024.0)
+    let free = kib("/proc/meminfo", "MemAvailable:")? * 1024.0;
+    Some(free.min(left_of_limit().unwrap_or(f64::INFINITY)))
+}
+
+/// Bytes that are left of the limit of the address space, if there is one.
+fn left_of_limit() -> Option<f64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits
+        .lines()
+        .find(|l| l.starts_with("Max address space"))?;
+    let limit: f64 = line.split_whitespace().nth(3)?.parse().ok()?;
+    let taken = kib("/proc/self/status", "VmSize:")? * 1024.0;
+    Some((limit - taken).max(0.0))
 }
 
 /// The number on the line of a file of the system that begins like this.

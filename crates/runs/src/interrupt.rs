@@ -1,16 +1,27 @@
-//! Ctrl-C and `kill` end a run at the next commit, not in the middle.
+//! Ctrl-C and `kill` end a run soon, in a state from which it can go on.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::thread;
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
+use signal_hook::{flag, low_level};
 
 use crate::Error;
 
+/// What becomes of a process whose time to end is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Last {
+    /// It ends now.
+    Leave,
+    /// It is at its end.
+    Wait,
+}
+
 /// A flag that the first SIGINT or SIGTERM sets. The second one ends the process at once.
 ///
-/// The loop looks at it after each step, commits, and leaves with [`Interrupt::EXIT_CODE`]. SIGHUP is
+/// The loop drops the step that it makes, commits, and leaves with [`Interrupt::EXIT_CODE`]. SIGHUP is
 /// left alone, so that `nohup` works.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt(Arc<AtomicBool>);
@@ -44,6 +55,28 @@ impl Interrupt {
     /// A flag that no signal sets, for callers that have none to wait for.
     pub fn never() -> Self {
         Self::default()
+    }
+
+    /// Ends the process with [`Interrupt::EXIT_CODE`] so long after a signal, if it has not ended by then: one evaluation on a large grid, or the
+    /// writing of large files, is not waited for. Commits are whole or absent, so that the run goes on from the last one. `last_words` comes first, and
+    /// may say that the process is at its end anyway.
+    pub fn leave_within(
+        &self,
+        grace: Duration,
+        last_words: impl FnOnce() -> Last + Send + 'static,
+    ) {
+        const LOOK: Duration = Duration::from_millis(20);
+        let interrupt = self.clone();
+        thread::spawn(move || {
+            while !interrupt.requested() {
+                thread::sleep(LOOK);
+            }
+            thread::sleep(grace);
+            match last_words() {
+                Last::Leave => low_level::exit(Self::EXIT_CODE.into()),
+                Last::Wait => {}
+            }
+        });
     }
 
     /// Whether the loop should commit and leave.

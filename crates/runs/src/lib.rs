@@ -74,5 +74,5 @@ mod stored;
 pub use checkpoint::{Array, CheckpointState};
 pub use directory::RunDirectory;
 pub use error::Error;
-pub use interrupt::Interrupt;
+pub use interrupt::{Interrupt, Last};
 pub use stored::StoredRun;

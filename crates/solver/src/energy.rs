@@ -8,7 +8,7 @@ use linearize::{Extensions, Graph, Inputs, Linearization, Value};
 use mean_curvature::MeanCurvatureStep;
 use operators::ComputeDevice;
 
-use crate::{Domain, DomainScales, Error, Precision};
+use crate::{Cancel, Domain, DomainScales, Error, Precision};
 
 pub(crate) mod check;
 mod helfrich;
@@ -78,6 +78,8 @@ pub struct MinimizingMovement<const D: usize> {
     stiffness: Value,
     /// `s`, where the motion is weighted.
     factors: Option<Value>,
+    /// Whether its minimum is still wanted.
+    cancel: Cancel,
 }
 
 impl<const D: usize> MovementGraph<'_, D> {
@@ -191,7 +193,13 @@ impl<const D: usize> MinimizingMovement<D> {
             anchor,
             stiffness,
             factors,
+            cancel: Cancel::default(),
         })
+    }
+
+    /// Ends the minimization with an error as soon as its minimum is not wanted any more.
+    pub fn set_cancel(&mut self, cancel: Cancel) {
+        self.cancel = cancel;
     }
 
     /// Sets the anchor and `c`, the [stiffness](crate::FlowParams::stiffness).
@@ -229,6 +237,7 @@ impl<const D: usize> MinimizingMovement<D> {
 
 impl<const D: usize> Objective<D> for MinimizingMovement<D> {
     fn value(&mut self, u: &Tensor<D>) -> Result<f64, Error> {
+        self.cancel.check()?;
         let parameters = self.parameters();
         let value = self.linearization.value(&[u.clone().into()], &parameters)?;
         let value = self.device.scalar(value.tensor::<1>()?)?;
@@ -240,6 +249,7 @@ impl<const D: usize> Objective<D> for MinimizingMovement<D> {
     }
 
     fn evaluate(&mut self, u: &Tensor<D>) -> Result<(f64, Tensor<D>), Error> {
+        self.cancel.check()?;
         let parameters = self.parameters();
         let evaluation = self.linearization.at(&[u.clone().into()], &parameters)?;
         let value = self.device.scalar(evaluation.value.tensor::<1>()?)?;
@@ -248,6 +258,7 @@ impl<const D: usize> Objective<D> for MinimizingMovement<D> {
     }
 
     fn hessian_vector_product(&mut self, p: &Tensor<D>) -> Result<Tensor<D>, Error> {
+        self.cancel.check()?;
         let product = self.linearization.apply(&[p.clone().into()])?;
         self.check()?;
         Ok(product[0].tensor::<D>()?)

@@ -70,6 +70,9 @@ pub enum Error {
     NoInterface,
     #[error("{what} need the whole grid; store that instead of active bricks")]
     NeedsGrid { what: &'static str },
+    /// Somebody [did not want it](crate::Cancel) any more.
+    #[error("the step was cancelled")]
+    Cancelled,
     #[error("direct steps do not take {what}: use minimizing steps")]
     NotDirect { what: &'static str },
     /// What a step of mean curvature flow refuses: a grid, scales, bricks.

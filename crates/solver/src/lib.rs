@@ -52,6 +52,7 @@
 
 mod bounds;
 mod bricks;
+mod cancel;
 mod cg;
 mod constraints;
 mod displacement;
@@ -81,6 +82,7 @@ mod times;
 
 pub use bounds::Bounds;
 pub use bricks::REACH as BRICK_REACH;
+pub use cancel::Cancel;
 pub use constraints::Constraints;
 pub use displacement::widths_between;
 pub use domain::{Domain, DomainScales};

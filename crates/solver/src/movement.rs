@@ -168,6 +168,7 @@ impl<const D: usize> Minimizations<D> {
         let inner = prepared.step.clone();
         let bounds = prepared.bounds.clone();
         let (energy, region) = prepared.energy(movement, stiffness)?;
+        energy.set_cancel(problem.cancel.clone());
         let mut minimizing = Minimizing {
             energy,
             region,

@@ -8,7 +8,7 @@ use operators::ComputeDevice;
 
 use crate::energy::check;
 use crate::{
-    Bounds, DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held,
+    Bounds, Cancel, DeviceField, Domain, DomainScales, EnergyTerms, Error, FlowParams, Held,
     MeanCurvatureStep, State, StepScales, TermCheck, bricks,
 };
 
@@ -38,6 +38,8 @@ pub struct Problem<const D: usize> {
     pub half: Option<Arc<Problem<D>>>,
     /// Where it is computed.
     pub device: ComputeDevice,
+    /// Whether a step is still wanted; see [`Self::set_cancel`].
+    pub cancel: Cancel,
 }
 
 impl<const D: usize> Problem<D> {
@@ -78,6 +80,7 @@ impl<const D: usize> Problem<D> {
             held: Held::default(),
             half: None,
             device: device.clone(),
+            cancel: Cancel::default(),
         })
     }
 
@@ -176,6 +179,16 @@ impl<const D: usize> Problem<D> {
         }
         self.held = held;
         Ok(())
+    }
+
+    /// Ends the step that is being made as soon as it is not wanted any more, also where it begins on the half grids.
+    pub fn set_cancel(&mut self, cancel: Cancel) {
+        if let Some(half) = self.half.take() {
+            let mut half = Arc::unwrap_or_clone(half);
+            half.set_cancel(cancel.clone());
+            self.half = Some(Arc::new(half));
+        }
+        self.cancel = cancel;
     }
 
     /// Makes bending and these terms the energy, by a step of mean curvature flow with this [response](Self::response). The Willmore energies of the

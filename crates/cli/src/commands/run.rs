@@ -5,7 +5,7 @@ use std::path::Path;
 use jobs::Outcome;
 
 use super::labels;
-use crate::console::Console;
+use crate::console::{Console, advice};
 use crate::error::{Error, Result};
 
 /// Makes a run, or one for each label of a volume. Its result goes to a file that stands for standard output, if there is one: the run does
@@ -44,12 +44,10 @@ pub fn tell(outcome: &Outcome, console: &Console) -> Result<()> {
     }
     let shown = outcome.folder.display();
     text.push(match (&outcome.summary, &outcome.page) {
-        (None, _) => {
-            // What was there already is to be written over by whoever goes on, too.
-            let saved = outcome.save.as_deref().is_some_and(Path::exists);
-            let force = if saved { " --force" } else { "" };
-            format!("interrupted, go on with: willmore resume {shown}{force}")
-        }
+        (None, _) => advice(
+            &outcome.folder,
+            outcome.save.as_deref().is_some_and(Path::exists),
+        ),
         (Some(_), None) => format!("results are in {shown}"),
         (Some(_), Some(page)) => {
             format!("results are in {shown}, to look at: {}", page.display())
