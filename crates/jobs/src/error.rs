@@ -169,8 +169,13 @@ pub enum Error {
         nodes: usize,
     },
     /// A mesh that bounds nothing, and that can perhaps be repaired.
-    #[error("{0}, or give `repair`")]
-    Repairable(surfaces::Error),
+    #[error("{error}, or give {}", if *vertices_follow { "`remesh` and `repair`" } else { "`repair`" })]
+    Repairable {
+        /// What is wrong with it.
+        error: surfaces::Error,
+        /// Whether the vertices of the mesh were to follow the flow.
+        vertices_follow: bool,
+    },
     /// A result that has no such format.
     #[error("`save` {}: a result in {dimension}D is saved as .{}", path.display(), formats.join(" or ."))]
     Format {
@@ -322,13 +327,26 @@ impl Error {
 
     /// Of a mesh that may bound nothing.
     pub(crate) fn mesh(error: surfaces::Error) -> Self {
-        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open};
+        Self::repairable(error, false)
+    }
+
+    /// Of one whose vertices were to follow the flow.
+    pub(crate) fn own_mesh(error: surfaces::Error) -> Self {
+        Self::repairable(error, true)
+    }
+
+    pub(crate) fn repairable(error: surfaces::Error, vertices_follow: bool) -> Self {
+        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap};
         match error {
             Open { .. }
             | NonManifold { .. }
             | MixedOrientation { .. }
             | Nesting { .. }
-            | NoArea { .. } => Self::Repairable(error),
+            | Overlap(_)
+            | NoArea { .. } => Self::Repairable {
+                error,
+                vertices_follow,
+            },
             error => error.into(),
         }
     }

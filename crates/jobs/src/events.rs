@@ -86,6 +86,8 @@ pub enum Warning {
     },
     /// Parts or holes are lost on the grid.
     Lost(Loss),
+    /// Bodies of a mesh overlap.
+    Overlap(surfaces::Overlap),
     /// A part of the boundary is at parts or gaps that are thin for the interface.
     Thin(ThinParts),
     /// Nodes that the faces of a mesh that crosses itself put on the wrong side were put right.
@@ -234,6 +236,7 @@ impl fmt::Display for Warning {
             }
             Self::Repaired { path, changes } => write!(f, "{}: {changes}", path.display()),
             Self::Volume { path, warning } => write!(f, "{}: {warning}", path.display()),
+            Self::Overlap(overlap) => overlap.fmt(f),
             Self::Lost(loss) => loss.fmt(f),
             Self::Thin(thin) => thin.fmt(f),
             Self::SignsMended { nodes } => write!(

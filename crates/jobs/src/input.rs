@@ -4,7 +4,7 @@ use engine::{Flow, Storage};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, Side, Tones};
 use surfaces::shapes::{self, BuiltIn};
-use surfaces::{Repaired, hausdorff_distance};
+use surfaces::{Mended, Repaired, hausdorff_distance};
 
 use crate::events::{GridDistance, Loss, ThinParts};
 use crate::file::{File, Input};
@@ -156,7 +156,7 @@ pub fn closed(file: &File, repairs: bool, watcher: &dyn Watcher) -> Result<Close
         });
         return Ok(repaired.mesh);
     }
-    let (mesh, changes) = ClosedMesh::new(mesh).map_err(Error::mesh)?;
+    let Mended { mesh, changes, .. } = ClosedMesh::mended(mesh).map_err(Error::mesh)?;
     for change in changes {
         watcher.warning(&Warning::Mended {
             path: path.clone(),
@@ -449,6 +449,7 @@ impl<'a> Reader<'a> {
         refuses: bool,
         vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
+        self.tell_overlap(mesh, refuses, vertices_follow)?;
         let wanted = Topology::of(mesh);
         let (field, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
@@ -469,6 +470,19 @@ impl<'a> Reader<'a> {
             self.watcher.warning(&Warning::Lost(loss));
         }
         Ok((field, surface))
+    }
+
+    /// Says that bodies overlap, which no grid tells apart, or refuses them before it is tried.
+    fn tell_overlap(&self, mesh: &ClosedMesh, refuses: bool, vertices_follow: bool) -> Result<()> {
+        let Some(overlap) = mesh.overlap() else {
+            return Ok(());
+        };
+        if refuses {
+            let error = surfaces::Error::Overlap(overlap);
+            return Err(Error::repairable(error, vertices_follow));
+        }
+        self.watcher.warning(&Warning::Overlap(overlap));
+        Ok(())
     }
 
     /// The surface of a phase field, unless it touches itself.

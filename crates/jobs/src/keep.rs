@@ -48,8 +48,8 @@ pub fn parse(
     }
     if let Some(mask) = mask {
         let mesh = surfaces::decode(mask, text)?;
-        let (mesh, _) = ClosedMesh::new(mesh).map_err(|error| wrong(error.to_string()))?;
-        return Ok(Box::new(MeshDistance::new(&mesh)));
+        let mended = ClosedMesh::mended(mesh).map_err(|error| wrong(error.to_string()))?;
+        return Ok(Box::new(MeshDistance::new(&mended.mesh)));
     }
     let region: Region = text.parse().map_err(wrong)?;
     Ok(region.shape()?)

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Followed};
+use surfaces::{Bound, Followed, Mended};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -43,6 +43,8 @@ pub struct OwnMesh {
 struct Loaded {
     bytes: Vec<u8>,
     mesh: TriangleMesh,
+    /// Where the mended mesh has its vertices.
+    places: Vec<[f64; 3]>,
     /// The file of the mask, if that is a mesh.
     mask: Option<Vec<u8>>,
     /// The distance of what stays.
@@ -93,7 +95,12 @@ impl OwnMesh {
         mask: Option<Vec<u8>>,
     ) -> Result<Vec<surfaces::Warning>> {
         let mesh = surfaces::decode(&bytes, path)?;
-        let (closed, warnings) = ClosedMesh::new(mesh.clone()).map_err(Error::mesh)?;
+        let mended = ClosedMesh::mended(mesh.clone()).map_err(Error::own_mesh)?;
+        let Mended {
+            mesh: closed,
+            changes,
+            places,
+        } = mended;
         if self.noise.is_nan() {
             self.noise = closed.mesh().noise();
         }
@@ -117,11 +124,12 @@ impl OwnMesh {
         self.loaded = Some(Box::new(Loaded {
             bytes,
             mesh,
+            places,
             mask,
             keep,
             fairing,
         }));
-        Ok(warnings)
+        Ok(changes)
     }
 
     fn loaded(&self) -> &Loaded {
@@ -153,7 +161,7 @@ impl OwnMesh {
                 problem,
             }
             .into()),
-            Err(other) => Err(Error::mesh(other)),
+            Err(other) => Err(Error::own_mesh(other)),
             Ok(_) => Ok(()),
         }
     }
@@ -254,11 +262,21 @@ impl OwnMesh {
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
         let lengths: Vec<f64> = squares.map(f64::sqrt).collect();
-        let Loaded { bytes, mesh, .. } = self.loaded();
+        let Loaded {
+            bytes,
+            mesh,
+            places,
+            ..
+        } = self.loaded();
         let all = TriangleMesh {
-            // Vertices of no face stay.
-            vertices: (mesh.vertices.iter())
-                .map(|x| goes.get(&key(*x)).copied().unwrap_or(*x))
+            vertices: (mesh.vertices.iter().zip(places))
+                .map(|(x, place)| match goes.get(&key(*place)) {
+                    Some(to) if key(*x) == key(*place) => *to,
+                    // It was joined to another one, from which it is as far as before.
+                    Some(to) => [0, 1, 2].map(|i| x[i] + (to[i] - place[i])),
+                    // Vertices of no face stay.
+                    None => *x,
+                })
                 .collect(),
             faces: mesh.faces.clone(),
             normals: None,

@@ -38,6 +38,28 @@ pub enum Warning {
     /// So many vertices of no face were left out.
     #[display("{_0} vertices of no face were left out")]
     Unreferenced(usize),
+    /// So many vertices became others that are at the same place up to rounding.
+    #[display("{_0} vertices were joined to others at the same place up to rounding")]
+    Joined(usize),
+    /// So many faces were there before, or are the back of another one.
+    #[display("{_0} faces that are there twice were left out")]
+    Doubled(usize),
+    /// So many faces were turned round, as their neighbours are.
+    #[display("{_0} faces were turned round to agree with their neighbours")]
+    Turned(usize),
+    /// So many faces had their corners on a line.
+    #[display("{_0} faces without area gave their longest sides to their neighbours")]
+    Flat(usize),
+    /// So many parts are oriented outwards within others.
+    #[display(
+        "{_0} parts lie within others without being turned inwards: the flow sees these bodies as cavities"
+    )]
+    Bodies(usize),
+    /// So many parts are oriented inwards, and lie in no other.
+    #[display(
+        "{_0} parts were oriented inwards where there is nothing around them: their faces were reversed"
+    )]
+    InsideOut(usize),
 }
 
 impl ClosedMesh {
@@ -177,14 +199,8 @@ impl ClosedMesh {
 }
 
 /// Refuses faces whose corners are on a line up to rounding.
-fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
-    let flat = |&face: &[u32; 3]| {
-        let [a, b, c] = mesh.corners(face);
-        let edges = [b - a, c - b, a - c].map(Vector::length);
-        let longest = edges.into_iter().fold(0.0, f64::max);
-        // The height over the longest edge, against the rounding of the cross product.
-        scaled_normal([a, b, c]).length() <= 4.0 * f64::EPSILON * longest * longest
-    };
+pub(crate) fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
+    let flat = |&face: &[u32; 3]| is_flat(mesh, face);
     let Some(face) = mesh.faces.iter().position(flat) else {
         return Ok(());
     };
@@ -193,6 +209,15 @@ fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
         face,
         corners: mesh.faces[face].map(|v| mesh.vertices[v as usize]),
     })
+}
+
+/// Whether the corners of a face are on a line up to rounding.
+pub(crate) fn is_flat(mesh: &TriangleMesh, face: [u32; 3]) -> bool {
+    let [a, b, c] = mesh.corners(face);
+    let edges = [b - a, c - b, a - c].map(Vector::length);
+    let longest = edges.into_iter().fold(0.0, f64::max);
+    // The height over the longest edge, against the rounding of the cross product.
+    scaled_normal([a, b, c]).length() <= 4.0 * f64::EPSILON * longest * longest
 }
 
 /// Leaves out vertices without faces and returns how many there were.
@@ -232,21 +257,9 @@ fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
         return Ok(());
     }
     let parts = seams.parts(mesh);
-    let bounds = parts.iter().map(|faces| {
-        let corners = faces.as_flattened().iter();
-        BoundingBox::around(corners.map(|&v| mesh.vertices[v as usize]))
-    });
-    let bounds: Vec<_> = bounds.collect();
-    let checked = (0..parts.len()).into_par_iter().map(|this| {
-        let x = mesh.vertices[parts[this][0][0] as usize];
-        let encloses = |k: &usize| *k != this && bounds[*k].is_some_and(|b| b.contains(x));
-        let angle = (0..parts.len()).filter(encloses).map(|other| {
-            let from_x = |v| v - Vector::from_array(x);
-            let faces = parts[other].iter();
-            let seen = faces.map(|&face| solid_angle(mesh.corners(face).map(from_x)));
-            seen.sum::<f64>()
-        });
-        let winding = angle.sum::<f64>() / (4.0 * std::f64::consts::PI);
+    let windings = windings(mesh, &parts);
+    let checked = (0..parts.len()).map(|this| {
+        let winding: f64 = windings[this].iter().sum();
         let outwards = mesh.volume_behind(&parts[this]) > 0.0;
         let expected = i64::from(!outwards);
         // Where components touch, the winding number is not whole and tells nothing.
@@ -261,21 +274,56 @@ fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
             expected,
         })
     });
-    // The first one, whatever the order of the threads.
-    checked.collect::<Vec<_>>().into_iter().collect()
+    checked.into_iter().collect()
+}
+
+/// For the first vertex of every part, the winding numbers of the other parts in whose box it is.
+fn windings(mesh: &TriangleMesh, parts: &[Vec<[u32; 3]>]) -> Vec<Vec<f64>> {
+    let bounds = parts.iter().map(|faces| {
+        let corners = faces.as_flattened().iter();
+        BoundingBox::around(corners.map(|&v| mesh.vertices[v as usize]))
+    });
+    let bounds: Vec<_> = bounds.collect();
+    let all = (0..parts.len()).into_par_iter().map(|this| {
+        let x = mesh.vertices[parts[this][0][0] as usize];
+        let encloses = |k: &usize| *k != this && bounds[*k].is_some_and(|b| b.contains(x));
+        let windings = (0..parts.len()).filter(encloses).map(|other| {
+            let from_x = |v| v - Vector::from_array(x);
+            let faces = parts[other].iter();
+            let seen = faces.map(|&face| solid_angle(mesh.corners(face).map(from_x)));
+            seen.sum::<f64>() / (4.0 * std::f64::consts::PI)
+        });
+        windings.collect()
+    });
+    all.collect()
+}
+
+/// How deep the parts of a surface lie in each other.
+pub(crate) struct Depths {
+    /// For every part, the number of others around it, however they are oriented.
+    pub(crate) enclosing: Vec<usize>,
+}
+
+impl Depths {
+    pub(crate) fn of(mesh: &TriangleMesh, parts: &[Vec<[u32; 3]>]) -> Self {
+        let around = |windings: &Vec<f64>| windings.iter().filter(|w| w.abs() > 0.5).count();
+        Self {
+            enclosing: windings(mesh, parts).iter().map(around).collect(),
+        }
+    }
 }
 
 /// How faces hang together.
-struct Seams {
+pub(crate) struct Seams {
     /// Number of the component of every face, in the order of first faces.
-    component: Vec<u32>,
-    components: usize,
+    pub(crate) component: Vec<u32>,
+    pub(crate) components: usize,
     /// Vertices, counted once for every sheet.
     vertices: usize,
 }
 
 impl Seams {
-    fn find(mesh: &TriangleMesh) -> Result<Self, Error> {
+    pub(crate) fn find(mesh: &TriangleMesh) -> Result<Self, Error> {
         let surface = HalfEdges::new(mesh)?;
         let (component, components) = surface.components();
         Ok(Self {
@@ -286,7 +334,7 @@ impl Seams {
     }
 
     /// The faces of every component.
-    fn parts(&self, mesh: &TriangleMesh) -> Vec<Vec<[u32; 3]>> {
+    pub(crate) fn parts(&self, mesh: &TriangleMesh) -> Vec<Vec<[u32; 3]>> {
         let mut parts = vec![Vec::new(); self.components];
         for (face, &part) in mesh.faces.iter().zip(&self.component) {
             parts[part as usize].push(*face);

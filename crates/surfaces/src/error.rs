@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use crate::Overlap;
 use crate::read::error::FormatError;
 
 /// Errors of mesh files, checks, placement and isosurfaces, each with the numbers needed to act on
@@ -113,6 +114,8 @@ pub enum Error {
          and outside cannot be told apart"
     )]
     NoVolume { volume: f64, area: f64 },
+    #[error("{0}")]
+    Overlap(Overlap),
     #[error(
         "the component with face {face} is oriented {orientation}, but {enclosing} other \
          components enclose it where {expected} should; unite overlapping parts, orient cavities \

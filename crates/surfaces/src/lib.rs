@@ -58,6 +58,7 @@
 
 mod bound;
 mod closed;
+mod crossings;
 mod distance;
 mod error;
 mod fairing;
@@ -67,6 +68,8 @@ mod half_edges;
 mod hierarchy;
 mod isosurface;
 mod level_set;
+mod lids;
+mod mending;
 mod mesh;
 mod parts;
 mod read;
@@ -84,12 +87,15 @@ mod write;
 
 pub use bound::Bound;
 pub use closed::{ClosedMesh, Warning};
+pub use crossings::Overlap;
 pub use distance::{MeshDistance, hausdorff_distance};
 pub use error::Error;
 pub use fairing::{Fairing, Followed};
 pub use filling::{Cells, Filling};
 pub use format::{up_axis, up_axis_of, usual_up_axis};
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
+pub use lids::Lids;
+pub use mending::Mended;
 pub use mesh::TriangleMesh;
 pub use parts::Parts;
 pub use read::error::FormatError;

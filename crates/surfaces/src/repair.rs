@@ -141,7 +141,7 @@ fn without_sharp_edges(u: Field<3>) -> Stored<3> {
 }
 
 /// Turns faces round so that neighbours across edges of two faces agree, as few as possible of each patch; returns how many.
-fn orient(faces: &mut [[u32; 3]]) -> usize {
+pub(crate) fn orient(faces: &mut [[u32; 3]]) -> usize {
     let mut edges: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
     for (number, face) in faces.iter().enumerate() {
         for i in 0..3 {

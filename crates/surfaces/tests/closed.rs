@@ -286,3 +286,217 @@ fn placement_centres_and_scales() {
         assert!(Placement::fit(&bounds, &grid, side_length).is_err());
     }
 }
+
+fn mended(mesh: TriangleMesh) -> surfaces::Mended {
+    assert!(
+        ClosedMesh::new(mesh.clone()).is_err(),
+        "nothing is to be mended"
+    );
+    ClosedMesh::mended(mesh).unwrap()
+}
+
+#[test]
+fn a_sound_mesh_is_mended_by_nothing() {
+    let mesh = torus(0.5, 0.2, 30, 20);
+    let mended = ClosedMesh::mended(mesh.clone()).unwrap();
+    assert_eq!((mended.mesh.mesh(), mended.changes), (&mesh, vec![]));
+    assert_eq!(mended.places, mesh.vertices);
+}
+
+/// As exporters leave them: a vertex on an edge, with a face that has nothing but this edge.
+#[test]
+fn faces_without_area_give_their_longest_sides_away() {
+    let mut mesh = sphere([0.0; 3], 10.0, 3);
+    let whole = closed(mesh.clone());
+    let (count, [a, b, c]) = (mesh.vertices.len() as u32, mesh.faces[0]);
+    let [x, y] = [a, b].map(|v| mesh.vertices[v as usize]);
+    mesh.vertices.push([0, 1, 2].map(|i| 0.5 * (x[i] + y[i])));
+    mesh.faces[0] = [a, count, c];
+    mesh.faces.extend([[count, b, c], [a, b, count]]);
+    let mended = mended(mesh.clone());
+    assert_eq!(mended.changes, [Warning::Flat(1)]);
+    assert_eq!(mended.mesh.mesh().vertices, mesh.vertices);
+    assert_eq!(mended.mesh.mesh().faces.len(), mesh.faces.len());
+    assert_eq!(topology(&mended.mesh), topology(&whole));
+    near(mended.mesh.volume(), whole.volume(), 1e-9);
+}
+
+#[test]
+fn doubled_faces_count_once() {
+    let whole = sphere([0.0; 3], 10.0, 3);
+    let mut twice = whole.clone();
+    twice.faces.extend([whole.faces[7], whole.faces[0]]);
+    let once = mended(twice.clone());
+    assert_eq!(once.changes, [Warning::Doubled(2)]);
+    assert_eq!(once.mesh.mesh().faces, whole.faces);
+    // A wall inside that is there from both sides encloses nothing.
+    let [a, b, c] = whole.faces[0];
+    twice.faces.truncate(whole.faces.len());
+    let far = whole
+        .faces
+        .iter()
+        .find(|face| !face.iter().any(|v| [a, b, c].contains(v)));
+    let d = far.unwrap()[0];
+    twice.faces.extend([[a, b, d], [b, a, d]]);
+    let without = mended(twice);
+    assert_eq!(without.changes, [Warning::Doubled(2)]);
+    assert_eq!(without.mesh.mesh().faces, whole.faces);
+}
+
+/// Facets that were written one by one, each with its own rounding.
+#[test]
+fn vertices_that_agree_up_to_rounding_are_one() {
+    let whole = sphere([0.0; 3], 10.0, 3);
+    let mut soup = TriangleMesh::default();
+    for (face, corners) in whole.faces.iter().enumerate() {
+        for &v in corners {
+            let off = |axis: usize| 1e-6 * ((7 * face + 3 * axis) % 5) as f64;
+            let x = whole.vertices[v as usize];
+            soup.vertices.push([0, 1, 2].map(|i| x[i] + off(i)));
+        }
+        soup.faces.push([0, 1, 2].map(|i| (3 * face + i) as u32));
+    }
+    let mended = mended(soup.clone());
+    let count = whole.vertices.len();
+    assert_eq!(mended.mesh.mesh().vertices.len(), count);
+    assert_eq!(mended.mesh.euler_characteristic(), 2);
+    let joined = mended.changes.iter().find_map(|change| match change {
+        Warning::Joined(joined) => Some(*joined),
+        _ => None,
+    });
+    assert!(
+        joined.is_some_and(|joined| joined > 3 * count),
+        "{:?}",
+        mended.changes
+    );
+    // Every corner knows where it is now.
+    for (x, place) in soup.vertices.iter().zip(&mended.places) {
+        assert!((0..3).all(|i| (x[i] - place[i]).abs() < 1e-5));
+        assert!(mended.mesh.mesh().vertices.contains(place));
+    }
+    // Gaps that are no rounding stay gaps.
+    for x in soup
+        .vertices
+        .as_flattened_mut()
+        .iter_mut()
+        .skip(1)
+        .step_by(7)
+    {
+        *x += 0.01;
+    }
+    assert!(matches!(ClosedMesh::mended(soup), Err(Error::Open { .. })));
+}
+
+#[test]
+fn mixed_orientation_becomes_that_of_the_neighbours() {
+    let mut mesh = torus(0.5, 0.2, 30, 20);
+    for face in mesh.faces.iter_mut().step_by(9) {
+        face.swap(0, 1);
+    }
+    let count = mesh.faces.len().div_ceil(9);
+    let mended = mended(mesh);
+    assert_eq!(mended.changes, [Warning::Turned(count)]);
+    near(
+        mended.mesh.volume(),
+        closed(torus(0.5, 0.2, 30, 20)).volume(),
+        1e-12,
+    );
+}
+
+#[test]
+fn parts_are_oriented_by_how_deep_they_lie() {
+    let ball = |radius| sphere([0.0; 3], radius, 3);
+    let volume = |radius| closed(ball(radius)).volume();
+    // A body in a body, and one in that.
+    let nested = together(together(ball(3.0), &ball(2.0)), &ball(1.0));
+    let mended_bodies = mended(nested);
+    assert_eq!(mended_bodies.changes, [Warning::Bodies(1)]);
+    near(
+        mended_bodies.mesh.volume(),
+        volume(3.0) - volume(2.0) + volume(1.0),
+        1e-9,
+    );
+    // A cavity stays one; what is inside out beside it is turned.
+    let beside = translated(reversed(ball(1.0)), [9.0, 0.0, 0.0]);
+    let both = together(together(ball(3.0), &reversed(ball(2.0))), &beside);
+    let mended_beside = mended(both);
+    assert_eq!(mended_beside.changes, [Warning::InsideOut(1)]);
+    near(
+        mended_beside.mesh.volume(),
+        volume(3.0) - volume(2.0) + volume(1.0),
+        1e-9,
+    );
+}
+
+#[test]
+fn several_trifles_are_mended_at_once_and_others_are_refused_as_they_are() {
+    let mut mesh = sphere([0.0; 3], 10.0, 3);
+    mesh.faces.push(mesh.faces[5]);
+    mesh.faces[9].swap(0, 2);
+    mesh.faces.push([4, 4, 6]);
+    let mended = mended(mesh);
+    let expected = [
+        Warning::Collapsed(1),
+        Warning::Doubled(1),
+        Warning::Turned(1),
+    ];
+    assert_eq!(mended.changes, expected);
+    let mut open = sphere([0.0; 3], 10.0, 3);
+    open.faces.remove(3);
+    assert!(matches!(
+        ClosedMesh::mended(open),
+        Err(Error::Open { edges: 3, .. })
+    ));
+}
+
+#[test]
+fn faces_that_cross_others_are_found() {
+    let ball = sphere([0.0; 3], 10.0, 3);
+    assert!(ball.crossing_faces().iter().all(|crosses| !crosses));
+    assert!(cube(0.5).crossing_faces().iter().all(|crosses| !crosses));
+    assert_eq!(closed(ball.clone()).overlap(), None);
+    let both = together(ball.clone(), &translated(ball.clone(), [12.0, 0.0, 0.0]));
+    // A vertex of one is in the other.
+    let Err(Error::Overlap(overlap)) = ClosedMesh::mended(both.clone()) else {
+        panic!(
+            "they overlap: {:?}",
+            ClosedMesh::mended(both.clone()).map(|m| m.changes)
+        );
+    };
+    assert_eq!(overlap.parts, 2);
+    let crossing = both
+        .crossing_faces()
+        .iter()
+        .filter(|crosses| **crosses)
+        .count();
+    assert_eq!(crossing, overlap.faces);
+    assert!((20..200).contains(&crossing), "{crossing}");
+    // Balls that do not touch, and cubes that touch in an edge or a corner, do not overlap; cubes with a common side do.
+    let apart = together(ball.clone(), &translated(ball, [20.1, 0.0, 0.0]));
+    assert_eq!(closed(apart).overlap(), None);
+    for (shift, overlaps) in [
+        ([1.0; 3], false),
+        ([1.0, 1.0, 0.0], false),
+        ([1.0, 0.0, 0.0], true),
+        ([1.0, 0.3, 0.2], true),
+    ] {
+        let cubes = together(cube(0.5), &translated(cube(0.5), shift));
+        // A corner of one may be on a side of the other.
+        let found = match ClosedMesh::mended(cubes) {
+            Ok(mended) => mended.mesh.overlap().is_some(),
+            Err(error) => matches!(error, Error::Overlap(_)),
+        };
+        assert_eq!(found, overlaps, "{shift:?}");
+    }
+    // One vertex pulled through the other side.
+    let mut folded = torus(0.5, 0.2, 30, 20);
+    folded.vertices[10] = [0.9, 0.0, 0.0];
+    assert!(
+        folded
+            .crossing_faces()
+            .iter()
+            .filter(|crosses| **crosses)
+            .count()
+            >= 6
+    );
+}

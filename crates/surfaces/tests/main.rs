@@ -8,6 +8,7 @@ mod fairing;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod lids;
 mod parts;
 mod remeshing;
 mod repairing;

@@ -1,0 +1,275 @@
+//! Faces that cross other faces.
+
+use derive_more::Display;
+use rayon::prelude::*;
+
+use crate::closed::Seams;
+use crate::vector::{Vector, scaled_normal};
+use crate::{ClosedMesh, TriangleMesh};
+
+/// Triangles in the smallest boxes.
+const LEAF: usize = 4;
+/// Distances from planes below this part of the lengths are rounding.
+const ROUNDING: f64 = 1e-12;
+/// Triangles that have less than this part of their sides in common touch each other.
+const TOUCHING: f64 = 1e-6;
+
+/// Bodies that reach into each other, or share a side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
+#[display(
+    "{parts} parts overlap: {faces} faces cross or touch those of another part, such as face {} that of face {}, so that inside and outside are not \
+     defined there; unite them",
+    first[0], first[1]
+)]
+pub struct Overlap {
+    /// Parts that do.
+    pub parts: usize,
+    /// Faces of one part that cross, or lie on, those of another.
+    pub faces: usize,
+    /// The first of them, and one that it crosses.
+    pub first: [usize; 2],
+}
+
+impl TriangleMesh {
+    /// For each face, whether it crosses others, beyond what neighbours have in common.
+    pub fn crossing_faces(&self) -> Vec<bool> {
+        let boxes = Boxes::new(self);
+        let faces = 0..self.faces.len();
+        let crosses = |face| {
+            boxes.any(face, |other| {
+                boxes.share_less_than_an_edge(face, other) && boxes.cross(face, other)
+            })
+        };
+        faces.into_par_iter().map(crosses).collect()
+    }
+}
+
+impl ClosedMesh {
+    /// The parts that overlap, if some do: where they do, the mesh does not say what is inside.
+    pub fn overlap(&self) -> Option<Overlap> {
+        if self.components() < 2 {
+            return None;
+        }
+        let seams = Seams::find(self.mesh()).expect("the mesh is closed");
+        Overlap::of(self.mesh(), &seams)
+    }
+}
+
+impl Overlap {
+    /// Of the parts of a mesh.
+    pub(crate) fn of(mesh: &TriangleMesh, seams: &Seams) -> Option<Self> {
+        let part = &seams.component;
+        let boxes = Boxes::new(mesh);
+        let faces = (0..mesh.faces.len()).into_par_iter();
+        let crossed = faces.map(|face| {
+            let mut found = None;
+            boxes.any(face, |other| {
+                let crosses = part[face] != part[other] && boxes.overlap(face, other);
+                found = crosses.then_some(other);
+                crosses
+            });
+            found
+        });
+        let crossed: Vec<Option<usize>> = crossed.collect();
+        let first = crossed.iter().position(Option::is_some)?;
+        let mut parts = vec![false; seams.components];
+        for (face, _) in crossed
+            .iter()
+            .enumerate()
+            .filter(|(_, other)| other.is_some())
+        {
+            parts[part[face] as usize] = true;
+        }
+        Some(Self {
+            parts: parts.iter().filter(|overlaps| **overlaps).count(),
+            faces: crossed.iter().flatten().count(),
+            first: [first, crossed[first]?],
+        })
+    }
+}
+
+/// Boxes around all faces, around halves of them, and so on.
+struct Boxes<'a> {
+    mesh: &'a TriangleMesh,
+    triangles: Vec<[Vector; 3]>,
+    nodes: Vec<Node>,
+    /// The faces of the smallest boxes, in a row.
+    order: Vec<usize>,
+}
+
+struct Node {
+    low: Vector,
+    high: Vector,
+    /// The faces, where it is one of the smallest, or the second half; the first one follows the node.
+    inside: Inside,
+}
+
+enum Inside {
+    Faces(std::ops::Range<usize>),
+    SecondHalf(usize),
+}
+
+impl<'a> Boxes<'a> {
+    fn new(mesh: &'a TriangleMesh) -> Self {
+        let triangles: Vec<_> = mesh.faces.iter().map(|&face| mesh.corners(face)).collect();
+        let mut boxes = Self {
+            mesh,
+            order: (0..triangles.len()).collect(),
+            triangles,
+            nodes: Vec::new(),
+        };
+        let mut order = std::mem::take(&mut boxes.order);
+        if !order.is_empty() {
+            boxes.divide(&mut order, 0);
+        }
+        boxes.order = order;
+        boxes
+    }
+
+    fn divide(&mut self, order: &mut [usize], begin: usize) {
+        let corners = || order.iter().flat_map(|&face| self.triangles[face]);
+        let low = corners().fold(Vector::INFINITY, Vector::min);
+        let high = corners().fold(Vector::NEG_INFINITY, Vector::max);
+        let number = self.nodes.len();
+        self.nodes.push(Node {
+            low,
+            high,
+            inside: Inside::Faces(begin..begin + order.len()),
+        });
+        if order.len() <= LEAF {
+            return;
+        }
+        let axis = (high - low).max_position();
+        let centre = |face: &usize| self.triangles[*face].iter().map(|x| x[axis]).sum::<f64>();
+        let half = order.len() / 2;
+        order.select_nth_unstable_by(half, |a, b| centre(a).total_cmp(&centre(b)));
+        let (first, second) = order.split_at_mut(half);
+        self.divide(first, begin);
+        self.nodes[number].inside = Inside::SecondHalf(self.nodes.len());
+        self.divide(second, begin + half);
+    }
+
+    /// Whether this holds for any face whose box touches that of a face.
+    fn any(&self, face: usize, mut holds: impl FnMut(usize) -> bool) -> bool {
+        let [a, b, c] = self.triangles[face];
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let mut open = vec![0];
+        while let Some(number) = open.pop() {
+            let node = &self.nodes[number];
+            if node.low.cmpgt(high).any() || node.high.cmplt(low).any() {
+                continue;
+            }
+            match &node.inside {
+                Inside::SecondHalf(second) => open.extend([number + 1, *second]),
+                Inside::Faces(range) => {
+                    let mut others = self.order[range.clone()].iter();
+                    if others.any(|&other| other != face && holds(other)) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Neighbours across an edge have no more in common, unless they lie on each other.
+    fn share_less_than_an_edge(&self, face: usize, other: usize) -> bool {
+        let vertices = self.mesh.faces[other];
+        let shared = self.mesh.faces[face]
+            .iter()
+            .filter(|v| vertices.contains(v));
+        shared.count() < 2
+    }
+
+    /// Whether both have a piece of the line in common in which their planes meet, and reach to both sides of the other one there.
+    fn cross(&self, one: usize, other: usize) -> bool {
+        cross(self.triangles[one], self.triangles[other])
+    }
+
+    /// Whether they cross, or lie in a plane and on each other.
+    fn overlap(&self, one: usize, other: usize) -> bool {
+        let [a, b] = [one, other].map(|face| self.triangles[face]);
+        self.cross(one, other) || lie_on_each_other(a, b)
+    }
+}
+
+/// Whether two triangles cross: touching is no crossing. T. Möller: A fast triangle-triangle intersection test. J. Graph. Tools 2 (1997).
+fn cross(one: [Vector; 3], other: [Vector; 3]) -> bool {
+    let (Some(of_one), Some(of_other)) = (heights(other, one), heights(one, other)) else {
+        return false;
+    };
+    let line = scaled_normal(one)
+        .cross(scaled_normal(other))
+        .normalize_or_zero();
+    let [low, high] = common(piece(one, of_one, line), piece(other, of_other, line));
+    high - low > TOUCHING * size(one).min(size(other))
+}
+
+/// The heights of the corners of a triangle over the plane of another one, if there are some on both sides.
+fn heights(base: [Vector; 3], triangle: [Vector; 3]) -> Option<[f64; 3]> {
+    let normal = scaled_normal(base).try_normalize()?;
+    let least = ROUNDING * (size(base) + size(triangle) + (triangle[0] - base[0]).length());
+    let heights = triangle.map(|x| normal.dot(x - base[0]));
+    let heights = heights.map(|height| if height.abs() > least { height } else { 0.0 });
+    let is_between = heights.iter().any(|h| *h > 0.0) && heights.iter().any(|h| *h < 0.0);
+    is_between.then_some(heights)
+}
+
+/// Where along a line the points of height zero of a triangle are.
+fn piece(triangle: [Vector; 3], heights: [f64; 3], line: Vector) -> [f64; 2] {
+    let mut piece = [f64::INFINITY, f64::NEG_INFINITY];
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        let (s, t) = (heights[i], heights[j]);
+        let point = if s == 0.0 {
+            triangle[i]
+        } else if s * t < 0.0 {
+            triangle[i].lerp(triangle[j], s / (s - t))
+        } else {
+            continue;
+        };
+        let place = line.dot(point - triangle[0]) + line.dot(triangle[0]);
+        piece = [piece[0].min(place), piece[1].max(place)];
+    }
+    piece
+}
+
+/// What two pieces of a line have in common.
+fn common(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].min(other[1])]
+}
+
+/// The longest side.
+fn size([a, b, c]: [Vector; 3]) -> f64 {
+    (b - a).length().max((c - b).length()).max((a - c).length())
+}
+
+/// Whether two triangles lie in a plane, and the middle of one, or a side of it, in the other.
+fn lie_on_each_other(one: [Vector; 3], other: [Vector; 3]) -> bool {
+    let normal = scaled_normal(one);
+    let length = normal.length();
+    let size = (one[1] - one[0]).length() + (other[1] - other[0]).length();
+    let far = |x: &Vector| normal.dot(*x - one[0]).abs() > 1e-9 * length * size;
+    if length == 0.0 || other.iter().any(far) {
+        return false;
+    }
+    let unit = normal / length;
+    let is_in = |x: Vector, [a, b, c]: [Vector; 3]| {
+        let area = scaled_normal([a, b, c]).dot(unit);
+        let part = |p: Vector, q: Vector| unit.dot((q - p).cross(x - p)) / area;
+        let parts = [part(a, b), part(b, c), part(c, a)];
+        area != 0.0 && parts.iter().all(|part| *part > 1e-6)
+    };
+    let middle = |t: [Vector; 3]| (t[0] + t[1] + t[2]) / 3.0;
+    let sides_cross = || {
+        let sides = |t: [Vector; 3]| [0, 1, 2].map(|i| [t[i], t[(i + 1) % 3]]);
+        let apart = |[p, q]: [Vector; 2], [a, b]: [Vector; 2]| {
+            let [s, t] = [a, b].map(|x| unit.dot((q - p).cross(x - p)));
+            let least = 1e-6 * (q - p).length() * (b - a).length();
+            s.abs() > least && t.abs() > least && (s > 0.0) != (t > 0.0)
+        };
+        let sides = [sides(one), sides(other)];
+        (sides[0].iter()).any(|&p| sides[1].iter().any(|&q| apart(p, q) && apart(q, p)))
+    };
+    is_in(middle(other), one) || is_in(middle(one), other) || sides_cross()
+}
