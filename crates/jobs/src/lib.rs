@@ -17,7 +17,7 @@
 //! # }
 //! ```
 //!
-//! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`] and [`surfaces_of_labels`] make their results in memory. [`run_in_folder`] keeps a run
+//! The functions [`flow`], [`fair`], [`inpaint`], [`mcf`], [`surfaces_of_labels`] and [`shared_labels`] make their results in memory. [`run_in_folder`] keeps a run
 //! in a folder, with pictures and a page, and [`resume`] continues it. [`open`] turns an input into a phase field on a suitable grid.
 //! [`check`] tests derivatives on an input. [`train`] trains networks for other widths of the interface and other sizes of
 //! the inner step, relative to the spacing of the grid.
@@ -55,6 +55,7 @@ mod run;
 mod sample;
 mod session;
 pub mod settings;
+mod shared;
 mod space;
 mod steps;
 mod train;
@@ -86,6 +87,7 @@ pub use presentation::Topology;
 pub use refusal::Refusal;
 pub use sample::sample;
 pub use session::{begin, resume, run_and_save, run_in_folder, run_in_memory};
+pub use shared::{LabelReport, SharedLabels, SharedReport, shared_labels, shared_labels_to_file};
 pub use steps::{StepState, Steps};
 pub use train::{TrainedNetwork, train, train_and_save};
 pub use volume::{labels, named};

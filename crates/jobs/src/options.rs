@@ -62,7 +62,7 @@ pub struct InputOptions {
 
     /// Label of the voxels that are inside, or the word all [default: if there are two labels, the one with the greater value]
     ///
-    /// With all, each label except 0 becomes a surface of its own.
+    /// With all, each label except 0 becomes a surface of its own; see also `shared`.
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
     pub label: Option<Label>,
 
@@ -446,6 +446,16 @@ pub struct FairOptions {
     /// `energy`, `energy_ratio` or `steps` says when to stop and `detail` is not given, there is no default.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub max_distance: Option<f64>,
+
+    /// With `label` all, smooth all labels together, so that neighbours share their walls
+    ///
+    /// Every point belongs to one label, of which 0 is the background: there are no gaps and no overlaps. Each label keeps the volume of its voxels. The
+    /// result goes to the file of `save` alone. A .ply or .obj has every wall once, with the labels behind and ahead of each triangle, as two properties or
+    /// in the name of its group. With .stl, each label gets a mesh of its own, whose vertices on shared walls are those of the neighbour. A .nii or .nii.gz
+    /// has the smooth labels in the voxels of the input.
+    #[arg(long, help_heading = OUTPUT)]
+    #[serde(skip)]
+    pub shared: bool,
 
     /// Stop as soon as the Willmore energy is no more than PART of the energy at the beginning
     ///

@@ -159,6 +159,16 @@ impl Voxels {
         closed(flowing).expect("parts of a closed surface are closed")
     }
 
+    /// The parts of this surface that do not flow, if there are some.
+    pub fn resting(&self) -> Option<ClosedMesh> {
+        let surface = self.surface();
+        let resting = (surface.parts()).only(surface.mesh(), |part| {
+            self.small.binary_search(&part).is_ok()
+        });
+        // Without faces there is none.
+        closed(resting)
+    }
+
     /// The file from which a run goes on, with its name.
     pub fn input(&self) -> Result<(String, Vec<u8>)> {
         let bytes = surfaces::encode_with_up(FILE, self.surface().mesh(), UpAxis::Z)?;

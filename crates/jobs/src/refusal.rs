@@ -219,6 +219,46 @@ pub enum Refusal {
         .0.display()
     )]
     NoLabels(PathBuf),
+    /// Shared walls, of less than all labels of a volume.
+    #[error(
+        "`shared` makes the walls between all labels of a segmentation: give `label` all, or leave it out"
+    )]
+    SharedOfNoLabels,
+    /// An option that says nothing about shared walls.
+    #[error(
+        "`{option}` has no meaning with `shared`{}: leave it out",
+        after_comma(why)
+    )]
+    Shared {
+        /// The option.
+        option: &'static str,
+        /// Why.
+        why: &'static str,
+    },
+    /// No file for shared walls, or one of another kind.
+    #[error(
+        "with `shared` the result goes to the file of `save` alone, {}: give .ply or .obj for all walls with the labels on their sides, .stl for a mesh of each          label, or .nii or .nii.gz for the smooth labels",
+        file.as_ref().map_or("which is not given".to_owned(), |file| format!("and {} is of another kind", file.display()))
+    )]
+    SharedFile {
+        /// The file.
+        file: Option<PathBuf>,
+    },
+    /// Labels so far apart for their voxels that no memory holds the lattice of their walls.
+    #[error(
+        "the walls of all labels take a lattice of {nodes:.1e} voxels, more than {most:.1e}: cut the volume, or leave out `shared`"
+    )]
+    TooManySharedNodes {
+        /// The nodes of the lattice.
+        nodes: f64,
+        /// The most.
+        most: f64,
+    },
+    /// Labels that have no place in a file.
+    #[error(
+        "label {0} is no whole number of 32 bits, which files of shared walls and of voxels hold: give it a smaller number"
+    )]
+    LargeLabel(i64),
 
     /// No value of an option without which nothing is trained.
     #[error(
@@ -256,6 +296,13 @@ pub enum Refusal {
 
 fn after_blank(value: Option<&str>) -> String {
     value.map_or(String::new(), |value| format!(" {value}"))
+}
+
+fn after_comma(why: &str) -> String {
+    match why {
+        "" => String::new(),
+        _ => format!(", {why}"),
+    }
 }
 
 fn joined(values: &[f64]) -> String {

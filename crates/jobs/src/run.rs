@@ -99,10 +99,17 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
 
     /// From the beginning to the end, in memory.
     pub fn make(&self, mut run: Run<D>) -> Result<Made<D>> {
-        if !self.advance(None, &mut run)? {
-            return Err(Error::Interrupted);
-        }
+        self.complete(&mut run)?;
         self.made(&run)
+    }
+
+    /// From the beginning to the end, in memory; nothing is made of the end.
+    pub fn complete(&self, run: &mut Run<D>) -> Result<()> {
+        if self.advance(None, run)? {
+            Ok(())
+        } else {
+            Err(Error::Interrupted)
+        }
     }
 
     /// The results so far, in memory.

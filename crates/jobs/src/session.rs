@@ -8,8 +8,9 @@ use crate::input::{InitialShape, Loaded, Opened, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::notes::RunNotes;
-use crate::options::{ForceOption, InputOptions, OperatorOptions, Stepper};
+use crate::options::{FairOptions, ForceOption, InputOptions, OperatorOptions, Stepper};
 use crate::outcome::Outcome;
+use crate::parts::Voxels;
 use crate::paths::absolute;
 use crate::plane::Plane;
 use crate::prelude::*;
@@ -129,6 +130,29 @@ pub fn run_in_memory(mut job: Job, watcher: &dyn Watcher) -> Result<Results> {
         Loaded::Plane(start) => Results::Plane(session.make(start)?),
         Loaded::Space(start) => Results::Space(session.make(start)?),
     })
+}
+
+/// A flow in memory, and the voxels from which it came.
+pub(crate) struct Flowed {
+    /// The phase field at the end.
+    pub field: Stored<3>,
+    /// The interface width.
+    pub eps: f64,
+    /// The voxels, and the parts of them that did not flow.
+    pub voxels: Voxels,
+}
+
+/// Makes the flow of a segmentation in memory; nothing is made of its end.
+///
+/// # Errors
+/// As [`run_in_memory`].
+pub(crate) fn flow_of_voxels(mut options: FairOptions, watcher: &dyn Watcher) -> Result<Flowed> {
+    options.run.save = None;
+    let (session, loaded) = Session::load(Job::Fair(options), None, watcher)?;
+    match loaded {
+        Loaded::Space(start) if start.presentation.voxels.is_some() => session.flowed(start),
+        _ => Err(Refusal::SharedOfNoLabels.into()),
+    }
 }
 
 /// Begins a job in memory whose steps are made one at a time. Nothing is written: options of files are ignored.
@@ -252,6 +276,18 @@ impl<'a> Session<'a> {
         let (case, presentation) = self.prepare(start)?;
         let run = Run::new(case, &self.device)?;
         self.plan(presentation).make(run)
+    }
+
+    fn flowed(mut self, start: InitialShape<3, Space>) -> Result<Flowed> {
+        let (case, presentation) = self.prepare(start)?;
+        let mut run = Run::new(case, &self.device)?;
+        let mut plan = self.plan(presentation);
+        plan.complete(&mut run)?;
+        Ok(Flowed {
+            field: run.stored().clone(),
+            eps: run.case().scales.eps,
+            voxels: plan.presentation.voxels.take().expect("there are voxels"),
+        })
     }
 
     fn begin<const D: usize, O>(mut self, start: InitialShape<D, O>) -> Result<Steps>

@@ -1,5 +1,6 @@
 //! Surfaces whose vertices stay within a distance of another surface.
 
+use geometry::measure::BoundingBox;
 use rayon::prelude::*;
 
 use crate::vector::Vector;
@@ -14,27 +15,62 @@ const AT: f64 = 1e-6;
 /// Distances are rounded by less than this part of them.
 const ROUNDING: f64 = 1e-9;
 
-/// A bound on the distance of vertices from a surface.
+/// A bound on the distance of vertices from a surface, or from the nearest of several.
 #[derive(Clone, Debug)]
 pub struct Bound {
-    distance: MeshDistance,
+    distances: Vec<(BoundingBox<3>, MeshDistance)>,
     length: f64,
 }
 
 impl Bound {
     /// Of this length, from the faces of a surface.
     pub fn new(surface: &ClosedMesh, length: f64) -> Self {
+        Self::of_nearest([surface], length)
+    }
+
+    /// Of this length, from the faces of whichever surface is nearest.
+    pub fn of_nearest<'a>(surfaces: impl IntoIterator<Item = &'a ClosedMesh>, length: f64) -> Self {
+        let surfaces = surfaces.into_iter();
+        let distances = surfaces.map(|s| (s.bounding_box(), MeshDistance::new(s)));
         Self {
-            distance: MeshDistance::new(surface),
+            distances: distances.collect(),
             length,
         }
     }
 
+    /// How far each vertex is.
+    pub fn lengths(&self, mesh: &TriangleMesh) -> Vec<f64> {
+        let offsets = self.offsets(&mesh.vertices);
+        offsets.into_iter().map(Vector::length).collect()
+    }
+
     /// For each vertex, whether it is at the bound or beyond it.
     pub fn reached(&self, mesh: &TriangleMesh) -> Vec<bool> {
-        let distances = self.distance.signed_distances(&mesh.vertices);
         let least = (1.0 - AT) * self.length;
-        distances.iter().map(|s| s.abs() >= least).collect()
+        let lengths = self.lengths(mesh).into_iter();
+        lengths.map(|length| length >= least).collect()
+    }
+
+    /// The ways from the nearest point of the surfaces to each of many points.
+    fn offsets(&self, points: &[[f64; 3]]) -> Vec<Vector> {
+        let mut nearest = vec![Vector::INFINITY; points.len()];
+        for (bounds, distance) in &self.distances {
+            let [lower, upper] = [bounds.lower, bounds.upper].map(Vector::from_array);
+            // Of a surface whose box is farther away than what is nearest so far, nothing is nearer.
+            let is_candidate = |point: &usize| {
+                let x = Vector::from_array(points[*point]);
+                x.distance_squared(x.clamp(lower, upper)) < nearest[*point].length_squared()
+            };
+            let candidates: Vec<usize> = (0..points.len()).filter(is_candidate).collect();
+            let places: Vec<[f64; 3]> = candidates.iter().map(|&point| points[point]).collect();
+            for (point, offset) in candidates.into_iter().zip(distance.offsets(&places)) {
+                let offset = Vector::from_array(offset);
+                if offset.length_squared() < nearest[point].length_squared() {
+                    nearest[point] = offset;
+                }
+            }
+        }
+        nearest
     }
 
     /// The mesh with vertices that are too far moved straight towards their nearest point on the surface, up to the bound.
@@ -44,12 +80,11 @@ impl Bound {
 
     /// The same, and for each vertex whether it has moved.
     fn clamped(&self, mesh: &TriangleMesh) -> (TriangleMesh, Vec<bool>) {
-        let offsets = self.distance.offsets(&mesh.vertices);
+        let offsets = self.offsets(&mesh.vertices);
         let clamped = mesh.vertices.par_iter().zip(offsets).map(|(&x, offset)| {
-            let offset = Vector::from_array(offset);
             let far = offset.length();
             // Those that were clamped before are not clamped again for the rounding.
-            if far > (1.0 + ROUNDING) * self.length {
+            if far.is_finite() && far > (1.0 + ROUNDING) * self.length {
                 let back = offset * (1.0 - self.length / far);
                 ((Vector::from_array(x) - back).to_array(), true)
             } else {

@@ -19,6 +19,11 @@ pub enum Error {
         path = path.display()
     )]
     UnknownFormat { path: PathBuf },
+    #[error(
+        "{path} cannot hold the labels on the sides of walls; .ply and .obj can",
+        path = path.display()
+    )]
+    NoLabels { path: PathBuf },
     #[error("{path} cannot be read as a mesh: {problem}", path = path.display())]
     Format { path: PathBuf, problem: FormatError },
     /// Grids and fields, and numbers outside their range.

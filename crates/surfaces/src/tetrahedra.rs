@@ -145,7 +145,7 @@ impl Lattice<'_> {
 
 /// The tetrahedra of a cell: their corners on a way along its edges to the opposite corner, with a bit for every axis, and whether they
 /// are positively oriented in that order.
-const TETRAHEDRA: [([usize; 4], bool); 6] = [
+pub const TETRAHEDRA: [([usize; 4], bool); 6] = [
     ([0, 1, 3, 7], true),
     ([0, 2, 6, 7], true),
     ([0, 4, 5, 7], true),

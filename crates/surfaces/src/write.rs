@@ -117,29 +117,39 @@ fn off(comment: &str, mesh: &TriangleMesh) -> String {
 }
 
 fn ply(comment: &str, mesh: &TriangleMesh) -> Vec<u8> {
-    let axes: &[&str] = match mesh.normals {
-        Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
-        None => &["x", "y", "z"],
-    };
-    let properties = axes.iter().map(|axis| format!("property double {axis}\n"));
-    let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\n{comment}element vertex {}\n{}element face {}\n\
-         property list uchar uint vertex_indices\nend_header\n",
-        mesh.vertices.len(),
-        properties.collect::<String>(),
-        mesh.faces.len()
-    )
-    .into_bytes();
-    for (vertex, position) in mesh.vertices.iter().enumerate() {
-        let normal = mesh.normals.as_ref().map(|n| n[vertex]);
-        let values = position.iter().chain(normal.iter().flatten());
-        out.extend(values.flat_map(|value| value.to_le_bytes()));
-    }
+    let mut out = ply_header(mesh, comment, "");
+    ply_vertices(mesh, &mut out);
     for face in &mesh.faces {
         out.push(3);
         out.extend(face.iter().flat_map(|vertex| vertex.to_le_bytes()));
     }
     out
+}
+
+/// The header of a PLY file, whose faces have other properties besides.
+pub(crate) fn ply_header(mesh: &TriangleMesh, comment: &str, of_faces: &str) -> Vec<u8> {
+    let axes: &[&str] = match mesh.normals {
+        Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
+        None => &["x", "y", "z"],
+    };
+    let properties = axes.iter().map(|axis| format!("property double {axis}\n"));
+    format!(
+        "ply\nformat binary_little_endian 1.0\n{comment}element vertex {}\n{}element face {}\n\
+         property list uchar uint vertex_indices\n{of_faces}end_header\n",
+        mesh.vertices.len(),
+        properties.collect::<String>(),
+        mesh.faces.len()
+    )
+    .into_bytes()
+}
+
+/// Adds the vertices with their normals.
+pub(crate) fn ply_vertices(mesh: &TriangleMesh, out: &mut Vec<u8>) {
+    for (vertex, position) in mesh.vertices.iter().enumerate() {
+        let normal = mesh.normals.as_ref().map(|n| n[vertex]);
+        let values = position.iter().chain(normal.iter().flatten());
+        out.extend(values.flat_map(|value| value.to_le_bytes()));
+    }
 }
 
 fn stl(comment: &str, mesh: &TriangleMesh, faces: u32) -> Vec<u8> {

@@ -29,6 +29,16 @@ pub(crate) struct Voxels {
 }
 
 impl Voxels {
+    fn of(values: &Values) -> Self {
+        let (element, bytes) = values.as_bytes();
+        Self {
+            bytes,
+            element,
+            big_endian: false,
+            scale: [1.0, 0.0],
+        }
+    }
+
     /// Whether they are whole numbers that a scale may turn into others.
     fn are_scaled(&self) -> bool {
         self.element.is_integer() && !self.scale.iter().all(|number| number.fract() == 0.0)
@@ -107,16 +117,17 @@ impl Volume {
         affine: [[f64; 4]; 3],
         values: &Values,
     ) -> Result<Self, Error> {
-        let (element, bytes) = values.as_bytes();
-        let voxels = Voxels {
-            bytes,
-            element,
-            big_endian: false,
-            scale: [1.0, 0.0],
-        };
         let column = |j: usize| DVec3::from_array([0, 1, 2].map(|i| affine[i][j]));
         let frame = DAffine3::from_cols(column(0), column(1), column(2), column(3));
-        Self::new(size, frame, voxels).map_err(Error::Volume)
+        Self::new(size, frame, Voxels::of(values)).map_err(Error::Volume)
+    }
+
+    /// The same voxels with other values.
+    ///
+    /// # Errors
+    /// As [`Volume::of_values`].
+    pub fn with_values(&self, values: &Values) -> Result<Self, Error> {
+        Self::new(self.size, self.frame, Voxels::of(values)).map_err(Error::Volume)
     }
 
     pub(crate) fn new(

@@ -14,8 +14,8 @@ const START: usize = 352;
 /// Most voxels along an axis.
 const MOST: usize = i16::MAX as usize;
 
-/// Writes labels of 0 to 255 as NIfTI-1, atomically, to a name that ends in `.nii`, or compressed in `.nii.gz`. Other values go to the
-/// nearest label. There may be up to 32767 voxels along each axis.
+/// Writes labels as NIfTI-1, atomically, to a name that ends in `.nii`, or compressed in `.nii.gz`. Values go to the nearest whole number, of 8 bits
+/// where all are from 0 to 255, and of 32 bits otherwise. There may be up to 32767 voxels along each axis.
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), Error> {
     let path = path.as_ref();
     let ends = |path: &Path, with: &str| {
@@ -53,9 +53,12 @@ fn nifti(out: &mut dyn Write, volume: &Volume) -> io::Result<()> {
     for (axis, n) in [3, x, y, z, 1, 1, 1, 1].into_iter().enumerate() {
         put(40 + 2 * axis, &n.to_le_bytes());
     }
-    // Whole numbers of 8 bits without sign.
-    put(70, &2_i16.to_le_bytes());
-    put(72, &8_i16.to_le_bytes());
+    let [low, high] = volume.range();
+    let is_small = low > -0.5 && high < 255.5;
+    // Whole numbers of 8 bits without sign, or of 32 bits.
+    let [kind, bits]: [i16; 2] = if is_small { [2, 8] } else { [8, 32] };
+    put(70, &kind.to_le_bytes());
+    put(72, &bits.to_le_bytes());
     put(108, &(START as f32).to_le_bytes());
     put(112, &1_f32.to_le_bytes());
     // The map of aligned coordinates.
@@ -72,6 +75,13 @@ fn nifti(out: &mut dyn Write, volume: &Volume) -> io::Result<()> {
     }
     put(344, b"n+1\0");
     out.write_all(&header)?;
-    let labels: Vec<u8> = volume.values().map(|value| value.round() as u8).collect();
-    out.write_all(&labels)
+    let labels = volume.values().map(f64::round);
+    let bytes: Vec<u8> = if is_small {
+        labels.map(|label| label as u8).collect()
+    } else {
+        labels
+            .flat_map(|label| (label as i32).to_le_bytes())
+            .collect()
+    };
+    out.write_all(&bytes)
 }

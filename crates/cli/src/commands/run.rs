@@ -11,6 +11,11 @@ use crate::error::{Error, Result};
 /// Makes a run, or one for each label of a volume. Its result goes to a file that stands for standard output, if there is one: the run does
 /// not name it.
 pub fn run(mut job: jobs::Job, output: Option<&Path>, console: &Console) -> Result<()> {
+    if let jobs::Job::Fair(options) = &job
+        && options.shared
+    {
+        return shared(options.clone(), console);
+    }
     let input = job.input().clone();
     let of_label = |label| {
         let mut one = job.clone();
@@ -29,6 +34,14 @@ pub fn run(mut job: jobs::Job, output: Option<&Path>, console: &Console) -> Resu
         None => jobs::run_in_folder(job, console)?,
     };
     tell(&outcome, console)
+}
+
+/// Smooths all labels of a volume together, into a file.
+fn shared(options: jobs::FairOptions, console: &Console) -> Result<()> {
+    let made = jobs::shared_labels_to_file(options, console)?;
+    let mut outcome = made.report.to_json();
+    outcome["command"] = "fair".into();
+    console.report(&outcome, &made.report.sentences().join("\n"))
 }
 
 /// Prints what came out of a run.
