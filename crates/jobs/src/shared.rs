@@ -219,8 +219,8 @@ pub fn shared_labels_to_file(
 }
 
 /// Smooths all labels of a segmentation together, in memory: each by the flow that [`surfaces_of_labels`](crate::surfaces_of_labels) makes, and the
-/// background too. A point belongs to the label in which it is deepest by its signed distances, each with a length of the label added, so that
-/// all labels keep the volumes of their voxels.
+/// background too, as what is outside of all labels together. A point that is not there belongs to the label in which it is deepest by its signed
+/// distances, each with a length of the label added, so that all labels keep the volumes of their voxels.
 ///
 /// # Errors
 /// As [`run_in_memory`](crate::run_in_memory), and for a volume without labels.
@@ -254,13 +254,13 @@ pub fn shared_labels(mut options: FairOptions, watcher: &dyn Watcher) -> Result<
     } else {
         None
     };
-    let bounds = flows.iter().map(|flow| flow.voxels.surface());
+    let bounds = flows.iter().chain(&all).map(|flow| flow.voxels.surface());
     let max_distance = flows[0].voxels.max_distance;
     let bound = Bound::of_nearest(bounds, max_distance.unwrap_or(f64::MAX));
     let mut shared = Sharing::new(&flows, all.as_ref())?;
     let walls = shared
         .walls()?
-        .relaxed(ROUNDS, &|label, x| shared.depths.at(label, x));
+        .relaxed(ROUNDS, &|pair, x| shared.depths.between(pair, x));
     let walls = walls.with_volumes(&shared.volumes, |_| true);
     let walls = walls.held(&bound, |walls, free| {
         walls.with_volumes(&shared.volumes, |vertex| free[vertex])
@@ -341,7 +341,7 @@ impl Sharing {
     fn walls(&mut self) -> Result<LabelMesh> {
         let mut walls = self.marched()?;
         for _ in 0..OFFSETS {
-            let now = walls.relaxed(0, &|label, x| self.depths.at(label, x));
+            let now = walls.relaxed(0, &|pair, x| self.depths.between(pair, x));
             let volumes = now
                 .volumes(self.volumes.len())
                 .into_iter()
@@ -418,8 +418,7 @@ impl Sharing {
         let voxels = (0..volume.len()).into_par_iter();
         let labels = voxels.map(|voxel| {
             let place = [voxel % x, voxel / x % y, voxel / (x * y)];
-            self.depths
-                .deepest(volume.position(place.map(|i| i as f64)))
+            self.depths.label(volume.position(place.map(|i| i as f64)))
         });
         labels.collect()
     }

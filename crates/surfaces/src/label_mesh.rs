@@ -24,8 +24,8 @@ const LAST_STEPS: usize = 6;
 /// Differences of distances have gradients of length two where walls are smooth; one below this points nowhere.
 const FLAT: f64 = 0.1;
 
-/// The depth of a point in what a label is, negative outside, and its gradient.
-pub type Depth<'a> = dyn Fn(u32, [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
+/// By how much a point is deeper in the first of two labels than in the second, and the gradient of this.
+pub type Depths<'a> = dyn Fn([u32; 2], [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
 
 /// The walls between labels, as one mesh: every point of space belongs to one label, and a wall is there once, with a label on either side.
 /// Labels are counted from 0, which is the [`BACKGROUND`].
@@ -63,7 +63,7 @@ impl LabelMesh {
     /// The walls with triangles of better shapes, where labels are equally deep: in every round vertices move towards the middle of their neighbours
     /// on the wall, those on a curve where three labels meet towards the middle of their neighbours on the curve, and back to where the depths of
     /// their labels are the same. None goes further than a cell from where it was.
-    pub fn relaxed(&self, rounds: usize, depth: &Depth<'_>) -> Self {
+    pub fn relaxed(&self, rounds: usize, deeper: &Depths<'_>) -> Self {
         let (around, first) = (self.neighbours(), self.mesh.points());
         let moved = |from: &[Vector], part: f64, steps: usize| -> Vec<Vector> {
             let vertices = (0..from.len()).into_par_iter();
@@ -74,7 +74,7 @@ impl LabelMesh {
                     let sum: Vector = near.iter().map(|&near| from[near as usize]).sum();
                     x = x.lerp(sum / near.len() as f64, part);
                 }
-                let x = self.on_walls(vertex, x, steps, depth);
+                let x = self.on_walls(vertex, x, steps, deeper);
                 first[vertex] + (x - first[vertex]).clamp_length_max(self.spacing)
             });
             one.collect()
@@ -88,18 +88,18 @@ impl LabelMesh {
     }
 
     /// Near a point, where the labels that meet at a vertex are equally deep.
-    fn on_walls(&self, vertex: usize, from: Vector, steps: usize, depth: &Depth<'_>) -> Vector {
+    fn on_walls(&self, vertex: usize, from: Vector, steps: usize, deeper: &Depths<'_>) -> Vector {
         let labels = &self.meeting[vertex];
         let mut x = from;
         for _ in 0..steps {
             // With three labels or four, one pair after the other.
             for (place, &a) in labels.iter().enumerate() {
                 for &b in &labels[place + 1..] {
-                    let [(a, slope_a), (b, slope_b)] = [a, b].map(|l| depth(l, x.to_array()));
-                    let slope = Vector::from_array(slope_a) - Vector::from_array(slope_b);
+                    let (difference, slope) = deeper([a, b], x.to_array());
+                    let slope = Vector::from_array(slope);
                     let squared = slope.length_squared();
                     if squared > FLAT * FLAT {
-                        let step = slope * ((b - a) / squared);
+                        let step = slope * (-difference / squared);
                         x += step.clamp_length_max(0.5 * self.spacing);
                     }
                 }

@@ -88,11 +88,14 @@ impl Smooth {
 }
 
 /// All labels of a segmentation, each as deep as it is smooth, and moved by a length of its own.
+///
+/// The background is what is outside of all labels together, so that the edge at which two labels meet it does not become a groove. Elsewhere a
+/// point belongs to the label in which it is deepest.
 pub struct Depths {
     labels: Vec<Smooth>,
-    /// All labels as one, if there are several; less its depth is that of the background.
+    /// All labels as one, if there are several.
     all: Option<Smooth>,
-    /// What is added to the depth of each label, and of the background, which is the first.
+    /// What is added to the depth of each label; the first is that of the background, which stays 0.
     pub offsets: Vec<f64>,
 }
 
@@ -105,21 +108,35 @@ impl Depths {
         })
     }
 
-    /// Of one label, with the gradient.
-    pub fn at(&self, label: u32, x: [f64; 3]) -> (f64, [f64; 3]) {
-        let (depth, slope) = if label == BACKGROUND {
-            let (depth, slope) = self.all.as_ref().unwrap_or(&self.labels[0]).at(x);
-            (-depth, slope.map(|slope| -slope))
-        } else {
-            self.labels[label as usize - 1].at(x)
-        };
-        (depth + self.offsets[label as usize], slope)
+    fn all(&self) -> &Smooth {
+        self.all.as_ref().unwrap_or(&self.labels[0])
     }
 
-    /// The label in which a point is deepest; of several the first.
-    pub fn deepest(&self, x: [f64; 3]) -> u32 {
-        let background = -self.all.as_ref().unwrap_or(&self.labels[0]).depth(x);
-        let mut deepest = (BACKGROUND, background + self.offsets[0]);
+    /// By how much a point is deeper in the first of two labels than in the second, with the gradient. The wall between them moves by half of the
+    /// difference of what is added to their depths, also that of the background.
+    pub fn between(&self, [a, b]: [u32; 2], x: [f64; 3]) -> (f64, [f64; 3]) {
+        let added = self.offsets[a as usize] - self.offsets[b as usize];
+        let ((depth, slope), factor) = match [a, b] {
+            [BACKGROUND, _] => (self.all().at(x), -2.0),
+            [_, BACKGROUND] => (self.all().at(x), 2.0),
+            [a, b] => {
+                let [(a, slope_a), (b, slope_b)] =
+                    [a, b].map(|l| self.labels[l as usize - 1].at(x));
+                let slope = [0, 1, 2].map(|axis| slope_a[axis] - slope_b[axis]);
+                ((a - b, slope), 1.0)
+            }
+        };
+        (factor * depth + added, slope.map(|slope| factor * slope))
+    }
+
+    /// The label of a point.
+    pub fn label(&self, x: [f64; 3]) -> u32 {
+        let depth = 2.0 * self.all().depth(x);
+        let far = self.all().distance.grid().spacing();
+        if depth < -FAR * far {
+            return BACKGROUND;
+        }
+        let mut deepest = (BACKGROUND, f64::NEG_INFINITY);
         for (number, label) in (1..).zip(&self.labels) {
             if label.contains(x) {
                 let depth = label.depth(x) + self.offsets[number as usize];
@@ -128,7 +145,12 @@ impl Depths {
                 }
             }
         }
-        deepest.0
+        let (label, _) = deepest;
+        if depth + self.offsets[label as usize] > 0.0 {
+            label
+        } else {
+            BACKGROUND
+        }
     }
 
     /// The labels of the nodes of a lattice.
@@ -141,7 +163,7 @@ impl Depths {
                 node / columns % rows,
                 node % columns,
             ];
-            self.deepest(lattice.position(place))
+            self.label(lattice.position(place))
         });
         LabelLattice {
             labels: labels.collect(),
