@@ -16,6 +16,7 @@ mod page;
 mod refusals;
 #[cfg(unix)]
 mod resume;
+mod shared;
 mod trust;
 mod tutorial;
 mod volumes;

@@ -8,6 +8,7 @@ mod fairing;
 mod files;
 mod fuzzing;
 mod isosurfaces;
+mod label_meshes;
 mod lids;
 mod parts;
 mod remeshing;

@@ -32,8 +32,8 @@
 //! # Meshes, segmentations, drawings
 //!
 //! The commands of the program `willmore` are functions: [`fair`](jobs::fair), [`flow`](jobs::flow), [`inpaint`](jobs::inpaint),
-//! [`surfaces_of_labels`](jobs::surfaces_of_labels), [`sample`](jobs::sample), and [`run_in_folder`](jobs::run_in_folder) for runs that are
-//! kept. They choose the grid, and report which parts of the shape it does not resolve.
+//! [`surfaces_of_labels`](jobs::surfaces_of_labels), [`shared_labels`](jobs::shared_labels), [`sample`](jobs::sample), and
+//! [`run_in_folder`](jobs::run_in_folder) for runs that are kept. They choose the grid, and report which parts of the shape it does not resolve.
 //!
 //! ```no_run
 //! use willmore::prelude::*;

@@ -22,8 +22,9 @@ pub use jobs::values::{Amount, Ansatz, Label, SizeTarget};
 pub use jobs::{
     CommonOptions, FairOptions, FieldKind, FlowOptions, InpaintOptions, Input, InputOptions,
     Inside, Job, LabelSurface, Made, McfOptions, MeshReport, Note, OperatorOptions, Outcome,
-    Results, RunOptions, SampleOptions, Shape, Silent, Summary, Warning, Watcher, WillmoreOptions,
-    fair, flow, inpaint, mcf, repair, run_in_folder, run_in_memory, sample, surfaces_of_labels,
+    Results, RunOptions, SampleOptions, Shape, SharedLabels, Silent, Summary, Warning, Watcher,
+    WillmoreOptions, fair, flow, inpaint, mcf, repair, run_in_folder, run_in_memory, sample,
+    shared_labels, surfaces_of_labels,
 };
 pub use mean_curvature::{
     Calibration, Factors, Identity, MeanCurvatureStep, PhaseInverses, StepFailure, StepScales,
