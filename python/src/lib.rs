@@ -5,6 +5,7 @@ mod exact;
 mod input;
 mod job;
 mod shape;
+mod shared;
 mod training;
 mod volume;
 mod watcher;
@@ -35,6 +36,8 @@ mod _willmore {
     use crate::program;
     #[pymodule_export]
     use crate::shape::{PyShape, read_mesh, repair, signed_distances, zero_curves, zero_surface};
+    #[pymodule_export]
+    use crate::shared::{PySharedLabels, shared_labels};
 
     #[pymodule_export]
     use crate::training::{PyNetwork, train};

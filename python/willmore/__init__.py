@@ -6,6 +6,7 @@ principal curvatures.
 ================= ==================================================================
 `fair`            take the noise off a mesh, whose vertices move
 `surfaces`        a smooth surface of each label of a segmentation
+`shared_surfaces` all labels of a segmentation at once, as `SharedSurfaces`
 `flow`            Willmore flow of a mesh, an image or a field, step by step
 `inpaint`         fill a region of an image, a mesh or a field smoothly
 `repair`          a closed mesh of one that is open or crosses itself
@@ -27,6 +28,7 @@ from ._meshes import Arrays
 from ._results import Result, WillmoreWarning
 from ._runs import Run
 from ._shapes import signed_distance, zero_level
+from ._shared import SharedSurfaces, shared_surfaces
 from ._training import Network, train_operator
 from ._willmore import VERSION as __version__
 from ._willmore import Error
@@ -38,6 +40,7 @@ __all__ = [
     "Network",
     "Result",
     "Run",
+    "SharedSurfaces",
     "State",
     "WillmoreWarning",
     "energy",
@@ -46,6 +49,7 @@ __all__ = [
     "flow",
     "inpaint",
     "repair",
+    "shared_surfaces",
     "signed_distance",
     "surfaces",
     "train_operator",

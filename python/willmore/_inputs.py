@@ -165,6 +165,16 @@ class Voxels:
         return Input.volume(list(self.values.shape), self.affine.tolist(), flat)
 
 
+def of_segmentation(labels: Any, *, affine: Any = None, spacing: Any = None, origin: Any = None) -> Input:
+    """A file by its name, or voxels."""
+    name = _meshes.of_path(labels)
+    if name is None:
+        return of_voxels(labels, affine=affine, spacing=spacing, origin=origin).input()
+    if not (affine is None and spacing is None and origin is None):
+        raise Error("a file says itself where its voxels are: leave out `affine`, `spacing` and `origin`")
+    return Input.named(str(name))
+
+
 def of_voxels(labels: Any, *, affine: Any = None, spacing: Any = None, origin: Any = None) -> Voxels:
     """An array, or the image of nibabel or pyvista."""
     if hasattr(labels, "dataobj") and hasattr(labels, "affine"):

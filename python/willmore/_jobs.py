@@ -139,7 +139,7 @@ def surfaces(
     ----------
     labels : (n, m, k) array, an image of nibabel or pyvista, or the name of a file
         Labels, of which 0 is outside; a mask; or grey values with `threshold`. Each label is smoothed alone: the surfaces of two labels that touch can
-        overlap or part by about a voxel.
+        overlap or part by about a voxel. `shared_surfaces` smooths all labels together.
     label : int or sequence of int, optional
         The labels that become surfaces, by default all but 0.
     threshold : float, optional

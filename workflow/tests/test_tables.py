@@ -157,8 +157,8 @@ def test_files_of_folders_have_names_of_their_own(sweep_folder: Path):
 
 
 def test_the_schema_has_the_options_of_the_program(program: str):
-    # Of these the workflow takes care itself; no flow depends on the seed.
-    own = {"help", "quiet", "json", "no-page", "output", "save", "force", "checkpoint-every", "config", "seed"}
+    # Of these the workflow takes care itself, `shared` makes no folder of a run, and no flow depends on the seed.
+    own = {"help", "quiet", "json", "no-page", "output", "save", "shared", "force", "checkpoint-every", "config", "seed"}
     rules = tables.schema("runs")["properties"]
     for command in ("flow", "fair", "inpaint", "mcf"):
         text = subprocess.run([program, command, "--help"], check=True, capture_output=True, text=True).stdout

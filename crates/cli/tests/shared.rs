@@ -45,7 +45,7 @@ fn labels_share_walls_and_keep_their_volumes() {
     let counts = volume.labels().unwrap();
     assert_eq!(made.names, [0, 3, 7, 300]);
     for (label, (name, count)) in made.report.labels.iter().zip(&counts[1..]) {
-        assert_eq!(f64::from(label.label), *name);
+        assert_eq!(i64::from(label.label), *name as i64);
         let voxels = *count as f64 * SIDE.powi(3);
         assert!((label.volume_before / voxels - 1.0).abs() < 1e-9);
         assert!(label.change_percent().abs() < 0.05, "{label:?}");
@@ -87,7 +87,10 @@ fn labels_share_walls_and_keep_their_volumes() {
     let after: Vec<usize> = smooth.labels().unwrap().iter().map(|one| one.1).collect();
     let told = made.report.labels.iter().map(|label| label.voxels_after);
     assert_eq!(after[1..], told.collect::<Vec<_>>());
-    let same = volume.values().zip(smooth.values()).filter(|(a, b)| a == b);
+    let same = volume
+        .values()
+        .zip(smooth.values())
+        .filter(|(a, b)| (a - b).abs() < 0.5);
     assert!(same.count() > SIZE.pow(3) * 98 / 100);
 }
 

@@ -29,6 +29,7 @@ pub type Depths<'a> = dyn Fn([u32; 2], [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
 
 /// The walls between labels, as one mesh: every point of space belongs to one label, and a wall is there once, with a label on either side.
 /// Labels are counted from 0, which is the [`BACKGROUND`].
+#[must_use]
 #[derive(Clone, Debug)]
 pub struct LabelMesh {
     /// The triangles. Their normals point from the first label of their sides to the second.
