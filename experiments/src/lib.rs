@@ -31,6 +31,7 @@ pub mod options;
 pub mod prelude;
 pub mod products;
 pub mod programs;
+pub mod segmentations;
 pub mod session;
 pub mod smoothing;
 pub mod step_table;

@@ -1,28 +1,30 @@
-//! Segmentations made smooth by Willmore flow with and without their volume kept, by Taubin's smoothing and by Laplacian smoothing.
+//! Segmentations made smooth by `willmore fair` and by what else there is, and how near the surfaces come to the shapes that were segmented.
 
-use chacha20::ChaCha8Rng;
+use std::process::Command;
+
+use jobs::{FairOptions, Input, Silent};
+use serde::Deserialize;
+use surfaces::TAUBIN;
 
 use crate::prelude::*;
-use crate::smoothing::{LAPLACIAN, fairing_flow, mesh_raster, rms_distance, rounds};
-use rand::{RngExt, SeedableRng};
-use surfaces::{TAUBIN, samples};
-use volumes::{Body, Inside, Volume};
+use crate::segmentations::{BODIES, Segmentation, WRONG};
+use crate::smoothing::{LAPLACIAN, mesh_raster, rounds};
 
 pub const EXPERIMENT: Experiment = Experiment {
     name: "unshrinking",
-    summary: "Segmentations without their steps, and their volumes.",
+    summary: "Segmentations without their steps, and their volumes, beside other methods.",
     program: |own| own.run(program),
     quick: Some(&[]),
     results: &[ResultFolder {
         name: "unshrinking",
         title: "Segmentations",
-        description: "Not in the paper: voxels become smooth surfaces by Willmore flow, with their volume kept and \
-                 without, beside other smoothing.",
+        description: "Not in the paper: a benchmark of smooth surfaces of voxels, by `willmore fair`, Taubin's and Laplacian smoothing, \
+                 SurfaceNets and constrained smoothing.",
         figures: &[(
             "surfaces",
-            "The surface by marching tetrahedra, and what becomes of it; the change of the volume.",
+            "The surface between the voxels, and what becomes of it; the distance to the shape.",
         )],
-        options: Some(""),
+        options: None,
     }],
     metrics: &[&METRICS],
     words: &[],
@@ -30,225 +32,373 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const METRICS: MetricTable = MetricTable {
     title: "Segmentations",
-    note: "",
+    note: "Lengths are in cube roots of the volume of a voxel. Values of several labels are the worst, those of `rms` and `normals` the means.",
     words: &[
-        ("BODY", "`ball`, with wrong labels; `figure`"),
+        (
+            "BODY",
+            "`ball`, with wrong labels; `figure`; `vessel`, thin beside a sac; `torus`, in voxels three times as long along one axis; `cortex`, a folded \
+             sheet of three voxels; `sectors`, three labels that touch",
+        ),
         (
             "TREATMENT",
-            "`marched`, the surface by marching tetrahedra; `fair` and `free`, Willmore flow of the surface of the \
-             voxels, whose staircase is taken off, with the volume kept and without; `marched_fair` and \
-             `marched_free`, the same from the surface `marched`; `taubin` and `laplacian`, smoothing of that with \
-             the best number of iterations",
+            "`voxels`, the surface between them by marching tetrahedra; `taubin` and `laplacian`, ten rounds of smoothing of it; `surface_nets`, \
+             vtkSurfaceNets3D; `constrained`, constrained smoothing of PyMCubes; `taubin_tuned`, `laplacian_tuned`, `surface_nets_tuned` and \
+             `constrained_tuned`, these with the parameters that come nearest to the shape; `fair`, the program at its defaults, with `shared` for \
+             several labels",
         ),
     ],
     rows: &[
         (
+            "unshrinking.BODY.TREATMENT.rms, unshrinking.BODY.TREATMENT.largest",
+            "distance of the surface to the shape, root of the mean square and largest",
+        ),
+        (
+            "unshrinking.BODY.TREATMENT.normals",
+            "mean angle between the normals and those of the shape at the nearest point, in degrees",
+        ),
+        (
+            "unshrinking.BODY.TREATMENT.area",
+            "by how much the area is larger than that of the shape, in percent: that of the staircase",
+        ),
+        (
             "unshrinking.BODY.TREATMENT.volume",
-            "change of the volume of the voxels (without specks, with holes of a few voxels) in percent",
+            "change of the volume of the voxels in percent",
         ),
         (
-            "unshrinking.BODY.TREATMENT.w_over_8pi",
-            "Willmore energy by implicit finite elements, in units of a sphere's",
+            "unshrinking.BODY.TREATMENT.thin",
+            "the same of a thin end of the vessel",
         ),
         (
-            "unshrinking.BODY.TREATMENT.displacement",
-            "largest distance of the vertices from the surface `marched`, in voxels",
+            "unshrinking.BODY.TREATMENT.gaps, unshrinking.BODY.TREATMENT.overlaps",
+            "volume inside of all labels together that belongs to none, and to several, in percent",
         ),
         (
-            "unshrinking.BODY.TREATMENT.rms",
-            "root of the mean square distance of the vertices to the shape, in voxels",
+            "unshrinking.BODY.TREATMENT.seconds",
+            "wall time, without reading and writing",
+        ),
+        (
+            "unshrinking.BODY.over_defaults, unshrinking.BODY.over_tuned",
+            "`rms` of `fair` over the least of the others at their defaults, and tuned",
+        ),
+        (
+            "unshrinking.BODY.normals_over_defaults, unshrinking.BODY.normals_over_tuned",
+            "the same of `normals`",
         ),
     ],
 };
 
-const TITLE: &str = "Segmentations without their steps, and their volumes";
-/// Bodies with their voxels along the longest side, in quick runs and usually.
-const BODIES: [(&str, [usize; 2]); 2] = [("ball", [16, 32]), ("figure", [24, 48])];
-/// Within a voxel of the surface, this part of the labels of the ball is wrong.
-const WRONG: f64 = 0.15;
-/// Layers of voxels around a body.
-const MARGIN: f64 = 3.0;
-/// Part of the box that the body fills, and cells along a voxel.
-const PART: f64 = 0.8;
-const FINE: f64 = 1.25;
-/// Time of the flow, and how far the surface may go, as `willmore fair` has them.
-const TIME: f64 = 6.5536;
-const FARTHEST: f64 = 0.35;
-/// The most iterations of Taubin's and of Laplacian smoothing.
-const ITERATIONS: usize = 200;
+const TITLE: &str = "Segmentations without their steps";
+/// Rounds of Taubin's and of Laplacian smoothing as trimesh 4 has them by default, and the most that are tried.
+const USUAL_ROUNDS: usize = 10;
+const MOST_ROUNDS: usize = 60;
+/// Of meshes of several labels one after the other.
+type Meshes = Vec<TriangleMesh>;
 
-/// A ball with wrong labels and a figure, as voxels: their surface by marching tetrahedra, what `willmore fair` makes of the voxels and of
-/// that surface, with the volume kept and without, and Taubin's and Laplacian smoothing of it with the number of iterations that comes
-/// nearest to the shape: volumes, energies, displacements.
+/// Surfaces of segmented shapes by `willmore fair` and by other methods: distances to the shapes, normals, areas, volumes, gaps, seconds.
+///
+/// SurfaceNets and constrained smoothing are those of VTK and PyMCubes, which `scripts/other_smoothings` runs. It says what it needs.
 #[derive(Parser, Debug)]
 #[command(version)]
 struct Options {
     #[command(flatten)]
     run: RunOptions,
+
+    /// The Python that has VTK and PyMCubes [default: without their methods]
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+
+    /// Take these bodies alone
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    bodies: Vec<String>,
 }
 
-/// A shape as voxels, whose sides are the unit of length.
-struct Segmented {
-    name: &'static str,
-    shape: Box<dyn SignedDistance<3>>,
-    up: UpAxis,
-    body: Body,
-    /// By marching tetrahedra, with all steps but without specks.
-    marched: ClosedMesh,
-    grid: Grid<3>,
-}
-
-/// What became of it, with key and words for how.
+/// What a method made of a segmentation.
 struct Row<'a> {
-    of: &'a Segmented,
-    treatment: (&'static str, &'static str),
-    iterations: Option<usize>,
+    of: &'a Segmentation,
+    treatment: String,
+    parameters: String,
     numbers: Numbers,
-    surface: TriangleMesh,
+    seconds: Option<f64>,
+    meshes: Meshes,
 }
 
-/// The change of the volume from that of the voxels in percent, the Willmore energy in units of a sphere's, the largest distance from the
-/// surface by marching tetrahedra, and the root of the mean square distance to the shape.
-const COLUMNS: [(&str, Format, &str); 4] = [
+const COLUMNS: [(&str, Format, &str); 8] = [
+    ("distance", Fixed(4), "rms"),
+    ("largest", Fixed(3), "largest"),
+    ("normals, degrees", Fixed(2), "normals"),
+    ("area, %", Fixed(2), "area"),
     ("volume, %", Fixed(4), "volume"),
-    ("w / 8 pi by elements", Fixed(3), "w_over_8pi"),
-    ("largest displacement", Fixed(3), "displacement"),
-    ("distance to the shape", Fixed(4), "rms"),
+    ("thin end, %", Fixed(3), "thin"),
+    ("gaps, %", Fixed(3), "gaps"),
+    ("overlaps, %", Fixed(3), "overlaps"),
 ];
+
+/// The methods in the figure.
+const SHOWN: [&str; 5] = ["voxels", "taubin", "surface_nets", "constrained", "fair"];
 
 fn program(options: &Options) -> Result<()> {
     let full = usize::from(!options.run.quick);
-    let parameters = json!({ "bodies": BODIES, "wrong": WRONG, "time": TIME, "taubin": TAUBIN, "laplacian": LAPLACIAN, "iterations": ITERATIONS });
+    let is_wanted =
+        |name: &str| options.bodies.is_empty() || options.bodies.iter().any(|b| b == name);
+    let bodies: Vec<_> = BODIES
+        .into_iter()
+        .filter(|(name, _)| is_wanted(name))
+        .collect();
+    require(!bodies.is_empty(), "--bodies: there are no such bodies")?;
+    let names: Vec<_> = bodies
+        .iter()
+        .map(|(name, sizes)| (*name, sizes[full]))
+        .collect();
+    let parameters = json!({ "bodies": names, "wrong": WRONG, "taubin": TAUBIN, "laplacian": LAPLACIAN, "rounds": [USUAL_ROUNDS, MOST_ROUNDS] });
     let mut session = Session::open(EXPERIMENT.name, &options.run, parameters)?;
     let seed = session.options.seed;
-    let bodies = BODIES.map(|(name, voxels)| Segmented::new(name, voxels[full] as f64, seed));
-    let bodies = bodies.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
+    let bodies = session.phase("shapes", |_| {
+        let bodies = names
+            .iter()
+            .map(|&(name, voxels)| Segmentation::new(name, voxels, seed));
+        bodies.collect::<Result<Vec<_>>>()
+    })?;
+    let others = match &options.python {
+        Some(python) => session.phase("other programs", |_| Others::of(&bodies, python))?,
+        None => Others::default(),
+    };
+    if !others.versions.is_empty() {
+        let versions: Vec<String> = (others.versions.iter())
+            .map(|(name, version)| format!("{name} {version}"))
+            .collect();
+        session.remark(format!("Other programs: {}.", versions.join(", ")));
+    }
+    let mut rows = Vec::new();
     for body in &bodies {
-        let treated = body.treated(&mut session)?;
-        let drawn = session.phase("pictures", |_| {
-            let shown = [0, 1, 2, 5, 6].map(|k: usize| treated[k].picture());
-            shown.into_iter().collect::<Result<Vec<_>, _>>()
-        });
-        pictures.extend(drawn?);
+        let treated = treated(&mut session, body, &others)?;
+        compare(&mut session, &treated)?;
         rows.extend(treated);
     }
     let table = Sheet::of(&rows)
-        .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment.0))
+        .keyed(|row, name| format!("unshrinking.{}.{}.{name}", row.of.name, row.treatment))
         .text("body", |row| row.of.name)
-        .text("surface", |row| row.treatment.1)
-        .column("iterations", Shortest, |row| row.iterations)
-        .numbers(&COLUMNS, |row| &row.numbers);
+        .text("surface", |row| &row.treatment)
+        .text("parameters", |row| &row.parameters)
+        .numbers(&COLUMNS, |row| &row.numbers)
+        .column("seconds", Fixed(2), |row| row.seconds);
     session.sheet(table, "unshrinking")?;
-    let figure = Figure::new(TITLE, 5).with_row_labels(BODIES.map(|(name, _)| name));
+    let pictures = session.phase("pictures", |_| {
+        let shown = rows.iter().filter(|row| SHOWN.contains(&&*row.treatment));
+        shown.map(Row::picture).collect::<Result<Vec<_>, _>>()
+    })?;
+    let columns = pictures.len() / bodies.len();
+    let labels: Vec<&str> = bodies.iter().map(|body| body.name).collect();
+    let figure = Figure::new(TITLE, columns).with_row_labels(labels);
     session.figure(figure.with_panels(pictures), "surfaces")?;
     session.finish(TITLE)
 }
 
-impl Segmented {
-    fn new(name: &'static str, voxels: f64, seed: u64) -> Result<Self> {
-        let centre = [0.5 * voxels + MARGIN + 0.2; 3];
-        let (shape, wrong, up): (Box<dyn SignedDistance<3>>, _, _) = if name == "ball" {
-            (Box::new(Ball::new(centre, 0.5 * voxels)?), WRONG, UpAxis::Z)
-        } else {
-            let figure = samples::figure(96)?;
-            let bounds = figure.bounding_box();
-            let scale = voxels / bounds.longest_side();
-            let corner = std::array::from_fn(|i| bounds.centre()[i] - centre[i] / scale);
-            let placed = figure.placed(&Placement::about(corner, scale)?);
-            (Box::new(MeshDistance::new(&placed)), 0.0, UpAxis::Y)
-        };
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let size = (voxels + 2.0 * MARGIN).ceil() as usize + 1;
-        let labels = (0..size.pow(3)).map(|voxel| {
-            let index = [voxel % size, voxel / size % size, voxel / (size * size)];
-            let distance = shape.signed_distance(index.map(|i| i as f64));
-            let is_wrong = distance.abs() < 1.0 && rng.random::<f64>() < wrong;
-            u8::from((distance < 0.0) != is_wrong)
-        });
-        let volume = Volume::of_labels([size; 3], [0.0; 3], [1.0; 3], labels.collect())?;
-        let side = voxels / PART;
-        // For the half grid.
-        let cells = 2 * (0.5 * FINE * side).ceil() as usize;
+/// What all methods make of a body.
+fn treated<'a>(
+    session: &mut Session,
+    body: &'a Segmentation,
+    others: &Others,
+) -> Result<Vec<Row<'a>>> {
+    let row = |treatment: &str, parameters: &str, seconds: Option<f64>, meshes: Meshes| {
+        Ok::<_, crate::Error>(Row {
+            of: body,
+            treatment: treatment.to_owned(),
+            parameters: parameters.to_owned(),
+            numbers: body.measured(&meshes)?,
+            seconds,
+            meshes,
+        })
+    };
+    let clock = Instant::now();
+    let labels = 1..=body.shapes.len();
+    let marched = labels
+        .map(|label| Ok(body.marched(label)?.into_mesh()))
+        .collect::<Result<Meshes>>()?;
+    let mut rows = vec![row(
+        "voxels",
+        "",
+        Some(clock.elapsed().as_secs_f64()),
+        marched.clone(),
+    )?];
+    session.phase(format!("{}: smoothing of the surface", body.name), |_| {
+        for (name, factors) in [("taubin", TAUBIN), ("laplacian", LAPLACIAN)] {
+            let clock = Instant::now();
+            let smoothed = |count: usize| {
+                marched
+                    .iter()
+                    .map(|mesh| mesh.smoothed(count, factors[0], factors[1]))
+                    .collect()
+            };
+            let usual: Meshes = smoothed(USUAL_ROUNDS);
+            let seconds = clock.elapsed().as_secs_f64();
+            rows.push(row(
+                name,
+                &format!("{USUAL_ROUNDS} rounds"),
+                Some(seconds),
+                usual,
+            )?);
+            let mut meshes: Vec<_> = marched.iter().map(|mesh| rounds(mesh, factors)).collect();
+            let mut best: Option<(usize, Row<'_>)> = None;
+            for count in 1..=MOST_ROUNDS {
+                let next = meshes.iter_mut().filter_map(Iterator::next).collect();
+                let next = row(
+                    &format!("{name}_tuned"),
+                    &format!("{count} rounds"),
+                    None,
+                    next,
+                )?;
+                if best
+                    .as_ref()
+                    .is_none_or(|(_, best)| next.numbers["rms"] < best.numbers["rms"])
+                {
+                    best = Some((count, next));
+                } else if best.as_ref().is_some_and(|(at, _)| count > at + 10) {
+                    break;
+                }
+            }
+            rows.extend(best.map(|(_, row)| row));
+        }
+        Ok::<_, crate::Error>(())
+    })?;
+    session.phase(format!("{}: meshes of other programs", body.name), |_| {
+        for name in ["surface_nets", "constrained"] {
+            let mut best: Option<Row<'_>> = None;
+            for run in others
+                .runs
+                .iter()
+                .filter(|run| run.body == body.name && run.method == name)
+            {
+                let meshes = others.meshes(run)?;
+                if run.parameters.is_empty() {
+                    rows.push(row(name, "defaults", Some(run.seconds), meshes.clone())?);
+                }
+                let next = row(
+                    &format!("{name}_tuned"),
+                    &run.parameters,
+                    Some(run.seconds),
+                    meshes,
+                )?;
+                if best
+                    .as_ref()
+                    .is_none_or(|best| next.numbers["rms"] < best.numbers["rms"])
+                {
+                    best = Some(next);
+                }
+            }
+            rows.extend(best);
+        }
+        Ok::<_, crate::Error>(())
+    })?;
+    let (meshes, seconds) = session.phase(format!("{}: fair", body.name), |_| faired(body))?;
+    rows.push(row("fair", "defaults", Some(seconds), meshes)?);
+    Ok(rows)
+}
+
+/// What the program makes of it at its defaults.
+fn faired(body: &Segmentation) -> Result<(Meshes, f64)> {
+    let clock = Instant::now();
+    let options = FairOptions::of(Input::volume(body.name, body.volume.clone()));
+    let meshes = if body.shapes.len() > 1 {
+        let made = jobs::shared_labels(options, &Silent)?;
+        let surface = |label: usize| made.walls.of_label(label as u32);
+        (1..=body.shapes.len()).map(surface).collect()
+    } else {
+        let made = jobs::fair(options, &Silent)?;
+        let shape = made.shape.as_ref().and_then(jobs::Shape::mesh);
+        shape.cloned().into_iter().collect()
+    };
+    Ok((meshes, clock.elapsed().as_secs_f64()))
+}
+
+/// The distance and the normals of the program over the best of the others.
+fn compare(session: &mut Session, rows: &[Row<'_>]) -> Result<()> {
+    let Some((fair, others)) = rows.split_last() else {
+        return Ok(());
+    };
+    for (metric, prefix) in [("rms", ""), ("normals", "normals_")] {
+        for (name, is_tuned) in [("defaults", false), ("tuned", true)] {
+            let meant = others
+                .iter()
+                .filter(|row| row.treatment.ends_with("_tuned") == is_tuned);
+            let least = meant
+                .map(|row| row.numbers[metric])
+                .fold(f64::INFINITY, f64::min);
+            let key = format!("unshrinking.{}.{prefix}over_{name}", fair.of.name);
+            session.metric(&key, fair.numbers[metric] / least)?;
+        }
+    }
+    Ok(())
+}
+
+/// What other programs made.
+#[derive(Deserialize, Default)]
+struct Others {
+    versions: BTreeMap<String, String>,
+    runs: Vec<OtherRun>,
+    #[serde(skip)]
+    folder: Option<tempfile::TempDir>,
+}
+
+#[derive(Deserialize)]
+struct OtherRun {
+    body: String,
+    method: String,
+    /// Empty for the defaults.
+    parameters: String,
+    seconds: f64,
+    files: Vec<String>,
+}
+
+impl Others {
+    /// Writes the bodies, and runs the programs.
+    fn of(bodies: &[Segmentation], python: &Path) -> Result<Self> {
+        let folder = tempfile::tempdir()?;
+        for body in bodies {
+            volumes::write(
+                folder.path().join(format!("{}.nii", body.name)),
+                &body.volume,
+            )?;
+        }
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/other_smoothings");
+        let status = Command::new(python)
+            .arg(script)
+            .arg(folder.path())
+            .status()?;
+        require(
+            status.success(),
+            "scripts/other_smoothings failed, as it says",
+        )?;
+        let told = files::read(&folder.path().join("others.json"))?;
         Ok(Self {
-            name,
-            up,
-            body: volume.body(Inside::Label(1.0))?,
-            marched: (volume.body(Inside::Above(0.5))?.surface).without_small_parts(8.0)?,
-            grid: Grid::new(cells, side)?.with_origin(centre.map(|x| x - 0.5 * side))?,
-            shape,
+            folder: Some(folder),
+            ..serde_json::from_slice(&told)?
         })
     }
 
-    fn treated(&self, session: &mut Session) -> Result<Vec<Row<'_>>> {
-        let (body, marched) = (&self.body.surface, &self.marched);
-        let (t, taubin) = self.smoothed(TAUBIN)?;
-        let (l, laplacian) = self.smoothed(LAPLACIAN)?;
-        let (none, kept, free) = (None, Some(true), Some(false));
-        let from_marched = MeshDistance::new(marched);
-        // Key, words, what it starts from, iterations, and for flows whether the volume is kept.
-        let all = [
-            ("marched", "marching tetrahedra", marched, None, none),
-            ("fair", "fair, volume kept", body, None, kept),
-            ("free", "fair, free", body, None, free),
-            ("marched_fair", "marched, volume kept", marched, None, kept),
-            ("marched_free", "marched, free", marched, None, free),
-            ("taubin", "Taubin", &taubin, Some(t), none),
-            ("laplacian", "Laplacian", &laplacian, Some(l), none),
-        ];
-        let row = |(key, words, start, iterations, flow): (_, _, &ClosedMesh, _, Option<bool>)| {
-            session.phase(format!("{}: {words}", self.name), |stage| {
-                let distance = MeshDistance::new(start).sample(self.grid, &|| ())?;
-                let mut case = fairing_flow(self.name, distance)?;
-                case.measures = vec![Measure::displacement(&case.initial, case.scales.eps)];
-                case.stops = vec![Stop::Time(TIME), Stop::Displacement(FARTHEST)];
-                let mut u = case.initial.clone();
-                let mut surface = start.mesh().clone();
-                let mut volume = start.volume();
-                if let Some(keeps) = flow {
-                    case.held.volume = keeps.then_some(Target::keep(body.volume()));
-                    let run = stage.run(case.clone())?;
-                    u = run.stored().clone();
-                    volume = ZeroSet::of(&u, case.scales.eps)?.volume;
-                    surface = surfaces::remeshed_surface(&u, case.scales.eps)?
-                        .with_volume(volume, |_| true);
-                }
-                let elements = case.implicit_elements()?.willmore_energy(&u.field()?)?;
-                let vertices = surface.vertices.iter();
-                let gone = vertices.map(|&x| from_marched.signed_distance(x).abs());
-                let numbers = Numbers::from([
-                    ("volume", 100.0 * (volume / body.volume() - 1.0)),
-                    ("w_over_8pi", elements / (8.0 * PI)),
-                    ("displacement", gone.fold(0.0, f64::max)),
-                    ("rms", rms_distance(&surface, &*self.shape)),
-                ]);
-                Ok(Row {
-                    of: self,
-                    treatment: (key, words),
-                    iterations,
-                    numbers,
-                    surface,
-                })
-            })
-        };
-        all.into_iter().map(row).collect()
-    }
-
-    /// The surface after the number of iterations that brings it nearest to the shape.
-    fn smoothed(&self, factors: [f64; 2]) -> Result<(usize, ClosedMesh)> {
-        let rounds = (1..=ITERATIONS).zip(rounds(self.marched.mesh(), factors));
-        let measured = rounds.map(|(k, mesh)| (rms_distance(&mesh, &*self.shape), k, mesh));
-        let nearest = measured.min_by(|a, b| a.0.total_cmp(&b.0));
-        let (_, count, mesh) = nearest.expect("there are iterations");
-        Ok((count, ClosedMesh::new(mesh)?.0))
+    fn meshes(&self, run: &OtherRun) -> Result<Meshes> {
+        let folder = self
+            .folder
+            .as_ref()
+            .map_or(Path::new(""), |folder| folder.path());
+        run.files
+            .iter()
+            .map(|file| Ok(surfaces::read(folder.join(file))?))
+            .collect()
     }
 }
 
 impl Row<'_> {
     fn picture(&self) -> Result<Raster> {
-        let (up, frame) = (self.of.up, self.of.marched.bounding_box());
-        let change = report::signed(&format!("{:+.2}", self.numbers["volume"]));
-        let caption = format!("{}\nvolume {change} %", self.treatment.1);
-        mesh_raster(&self.surface, up, frame, caption)
+        let mut all = TriangleMesh::default();
+        for mesh in &self.meshes {
+            let first = all.vertices.len() as u32;
+            all.vertices.extend(&mesh.vertices);
+            all.faces
+                .extend(mesh.faces.iter().map(|face| face.map(|v| v + first)));
+        }
+        let frame = all.bounding_box().ok_or("there is no surface")?;
+        let name = self.treatment.replace('_', " ");
+        let caption = format!("{name}\ndistance {:.3}", self.numbers["rms"]);
+        mesh_raster(&all, self.of.up, frame, caption)
     }
 }
