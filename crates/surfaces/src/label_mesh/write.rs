@@ -16,7 +16,7 @@ impl LabelMesh {
     /// - OBJ: the group `labels_A_B` has the faces behind which is the label `A`, and ahead of which is `B`.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`]; [`Error::NoLabels`] for STL; [`Error::NoFaces`]; [`Error::NonFiniteVertex`].
+    /// [`Error::UnknownFormat`]; [`Error::NoLabels`] for OFF and STL; [`Error::NoFaces`]; [`Error::NonFiniteVertex`].
     pub fn encode(&self, path: impl AsRef<Path>, names: &[i32]) -> Result<Vec<u8>, Error> {
         let path = path.as_ref();
         let format = Format::of(path)?;
@@ -27,7 +27,7 @@ impl LabelMesh {
         match format {
             Format::Ply => Ok(self.ply(names)),
             Format::Obj => Ok(self.obj(names).into_bytes()),
-            Format::Stl => Err(Error::NoLabels { path: path.into() }),
+            Format::Off | Format::Stl => Err(Error::NoLabels { path: path.into() }),
         }
     }
 
