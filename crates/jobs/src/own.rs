@@ -1,6 +1,7 @@
 //! The mesh that a person gave: its vertices follow the flow.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
 use surfaces::{Bound, Followed, Mended};
@@ -50,6 +51,8 @@ struct Loaded {
     /// The distance of what stays.
     keep: Option<Box<dyn SignedDistance<3>>>,
     fairing: Fairing,
+    /// The vertices in the box, once the start of the flow is known.
+    followed: OnceLock<Followed>,
 }
 
 impl OwnMesh {
@@ -128,6 +131,7 @@ impl OwnMesh {
             mask,
             keep,
             fairing,
+            followed: OnceLock::new(),
         }));
         Ok(changes)
     }
@@ -182,15 +186,20 @@ impl OwnMesh {
         Some(NodeSet::inside(grid, &|x| -keep.signed_distance(x)))
     }
 
-    /// The grid has the coordinates of the mesh.
-    fn followed(&self, start: &Stored<3>, eps: f64) -> Result<Followed> {
+    /// The grid has the coordinates of the mesh. A run has one start.
+    fn followed(&self, start: &Stored<3>, eps: f64) -> Result<&Followed> {
+        let followed = &self.loaded().followed;
+        if let Some(followed) = followed.get() {
+            return Ok(followed);
+        }
         let in_place = Placement::about([0.0; 3], 1.0)?;
-        Ok(self.fairing().follow(in_place, start, eps)?)
+        let found = self.fairing().follow(in_place, start, eps)?;
+        Ok(followed.get_or_init(|| found))
     }
 
     /// How far the vertices have gone along the normals, root of the mean square, is measured, and the flow ends when the noise is off.
     pub fn known(&self, start: &Stored<3>, eps: f64) -> Result<Known<3>> {
-        let (fairing, followed) = (self.fairing().clone(), self.followed(start, eps)?);
+        let (fairing, followed) = (self.fairing().clone(), self.followed(start, eps)?.clone());
         let mut stops = Vec::new();
         if self.noise != 0.0 {
             stops.push(Stop::Time(fairing.time(start.grid().spacing(), 1.0)));
@@ -250,7 +259,7 @@ impl OwnMesh {
         }
         let fairing = self.fairing();
         let followed = self.followed(start, eps)?;
-        let mut moved = fairing.faired(&followed, u)?;
+        let mut moved = fairing.faired(followed, u)?;
         let volume = match (self.keeps_volume, self.drives_volume) {
             (true, _) => Some(rough.volume()),
             (_, true) => Some(ZeroSet::of(u, eps)?.volume),
@@ -281,7 +290,7 @@ impl OwnMesh {
             faces: mesh.faces.clone(),
             normals: None,
         };
-        let lost = fairing.unresolved(&followed, thinnest(start.grid()));
+        let lost = fairing.unresolved(followed, thinnest(start.grid()));
         let mut report = MeshReport {
             noise: Some(self.noise),
             left_behind_percent: Some(100.0 * followed.left_behind(u)?),

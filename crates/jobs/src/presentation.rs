@@ -124,6 +124,11 @@ pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
         Ok(None)
     }
 
+    /// Whether a copy of the input is the shape at the beginning.
+    fn starts_as_input(&self) -> bool {
+        false
+    }
+
     /// The parts and holes of the input, where these are known better than from the phase field.
     fn input(&self) -> Option<Topology> {
         None

@@ -352,7 +352,7 @@ impl<const D: usize> Observer<D> for Steps<'_> {
     }
 }
 
-/// Writes the shape at the beginning, and pictures of it in between, and says when its parts or holes change.
+/// Writes the shape at the beginning, unless it is the input, and pictures of it in between, and says when its parts or holes change.
 struct Pictures<'a, const D: usize, O> {
     plan: &'a Plan<'a, D, O>,
     topology: Option<Topology>,
@@ -369,7 +369,7 @@ impl<const D: usize, O: Presentation<D>> Observer<D> for Pictures<'_, D, O> {
         let failed = |error: Error| engine::Error::Observer(error.into());
         let frames = plan.options.frames;
         if let Some(directory) = event.directory.as_deref_mut() {
-            if step == 0 {
+            if step == 0 && !plan.presentation.starts_as_input() {
                 let written = plan.write_shape(u, eps, None, presentation::START, directory);
                 written.map_err(failed)?;
             }

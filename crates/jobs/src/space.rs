@@ -110,6 +110,10 @@ impl Presentation<3> for Space {
         }
     }
 
+    fn starts_as_input(&self) -> bool {
+        self.own.is_some()
+    }
+
     fn input(&self) -> Option<Topology> {
         self.input
     }
