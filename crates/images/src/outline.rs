@@ -82,13 +82,17 @@ impl Outline {
     /// The same curves without the raster of an image, whose bending energy would outweigh that of the shape.
     ///
     /// Points every half unit move towards the middle of their neighbours again and again, but none goes further than `tolerance` from
-    /// where it was; then each curve gets back the area that it has lost by this. Of an image, [`Tones::raster`](crate::Tones::raster) says how far the points of its outline may be off.
+    /// where it was; then each curve gets back the area that it has lost by this. Outlines of more than a hundred thousand units have fewer rounds of
+    /// this, which take off shorter waves. Of an image, [`Tones::raster`](crate::Tones::raster) says how far the points of its outline may be off.
     /// The tolerance must be finite and positive.
     pub fn smoothed(&self, tolerance: f64) -> Result<Self, Error> {
         positive("tolerance", tolerance)?;
-        let curves = self.curves.par_iter();
+        let curves: Vec<_> = self.curves.par_iter().map(every_half_unit).collect();
+        let points: usize = curves.iter().map(Vec::len).sum();
+        let rounds = (MOST_MOVES / points.max(1)).clamp(FEWEST_ROUNDS, ROUNDS);
+        let curves = curves.into_par_iter();
         Ok(Self {
-            curves: (curves.map(|curve| smoothed(every_half_unit(curve), tolerance))).collect(),
+            curves: (curves.map(|points| smoothed(points, tolerance, rounds))).collect(),
         })
     }
 
@@ -121,9 +125,11 @@ impl Outline {
         &self.curves
     }
 
-    /// The middle of each segment with its outward normal and its length.
-    pub fn sides(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], f64)> + Clone {
+    /// The middle of each segment with its outward normal and its length; of long outlines those of every k-th segment, at most `most` of them.
+    pub fn sides(&self, most: usize) -> impl Iterator<Item = ([f64; 2], [f64; 2], f64)> + Clone {
         let segments = self.curves.iter().flat_map(Polyline::segments);
+        let count: usize = self.curves.iter().map(|curve| curve.points.len()).sum();
+        let segments = segments.step_by(count.div_ceil(most).max(1));
         let sides = segments.map(|(a, b)| {
             let along = [b[0] - a[0], b[1] - a[1]];
             let length = along[0].hypot(along[1]);
@@ -181,14 +187,18 @@ fn every_half_unit(curve: &Polyline) -> Vec<[f64; 2]> {
 
 /// Rounds of smoothing, which take off waves of up to some 60 units.
 const ROUNDS: usize = 1500;
+/// Outlines that are so long that these rounds would move points more often than this have fewer,
+const MOST_MOVES: usize = 300_000_000;
+/// but not fewer than these, which take off the steps between pixels.
+const FEWEST_ROUNDS: usize = 60;
 
 /// A closed curve that is as short as it can be, none of whose points goes further than that, moved along its normals to the area that it
 /// had.
-fn smoothed(original: Vec<[f64; 2]>, farthest: f64) -> Polyline {
+fn smoothed(original: Vec<[f64; 2]>, farthest: f64, rounds: usize) -> Polyline {
     let count = original.len();
     let mut points = original.clone();
     let mut next = points.clone();
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         for (k, point) in next.iter_mut().enumerate() {
             let [before, after] = [points[(k + count - 1) % count], points[(k + 1) % count]];
             let wanted =

@@ -1,7 +1,7 @@
 use std::f64::consts::PI;
 
 use crate::file::File;
-use crate::input::{Loaded, Source, closed};
+use crate::input::{Loaded, RepairCells, Source, closed};
 use crate::keep;
 use crate::options::{FairOptions, WillmoreOptions};
 use crate::own::OwnMesh;
@@ -117,7 +117,7 @@ impl FairOptions {
             self.keep = Some(to_text(absolute(mask)?.as_os_str()));
         }
         let bytes = if repairs {
-            let repaired = closed(file, true, watcher)?;
+            let repaired = closed(file, RepairCells::of(&self.input), watcher)?;
             surfaces::encode_with_up(path, repaired.mesh(), file.up_axis()?)?
         } else {
             file.read()?.into_owned()

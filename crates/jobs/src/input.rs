@@ -124,7 +124,9 @@ const THIN_PART: f64 = 0.02;
 const MOST_LOST: f64 = 0.25;
 /// Rays by which the thickness of a mesh is measured.
 const MOST_RAYS: usize = 4096;
-/// Cells along a mesh that is repaired.
+/// Segments of an outline by which its thickness is measured.
+const MOST_SEGMENTS: usize = 1 << 16;
+/// Cells along a mesh that is repaired, unless `cells` says how many.
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
 const PHOTOGRAPH: f64 = 0.05;
@@ -145,11 +147,27 @@ pub fn usual_format(input: &Input) -> Result<String> {
     })
 }
 
+/// The cells along a mesh that is repaired.
+#[derive(Clone, Copy)]
+pub struct RepairCells(usize);
+
+impl RepairCells {
+    /// Those of the options, if it is to be repaired.
+    pub fn of(options: &InputOptions) -> Option<Self> {
+        let cells = options.cells.unwrap_or(REPAIR_CELLS);
+        (options.repair).then_some(Self(cells.max(FEWEST_CELLS)))
+    }
+}
+
 /// The closed mesh in a file, possibly after a repair.
-pub fn closed(file: &File, repairs: bool, watcher: &dyn Watcher) -> Result<ClosedMesh> {
+pub fn closed(
+    file: &File,
+    repairs: Option<RepairCells>,
+    watcher: &dyn Watcher,
+) -> Result<ClosedMesh> {
     let (mesh, path) = (file.mesh()?, &file.path);
-    if repairs {
-        let repaired = surfaces::repair(&mesh, REPAIR_CELLS)?;
+    if let Some(RepairCells(cells)) = repairs {
+        let repaired = surfaces::repair(&mesh, cells)?;
         watcher.warning(&Warning::Repaired {
             path: path.clone(),
             changes: repaired.changes,
@@ -341,7 +359,7 @@ impl<'a> Reader<'a> {
         let is_planar = self.source.is_planar()?;
         Ok(match self.source.clone() {
             Source::Mesh(file) => {
-                let mesh = closed(&file, self.options.repair, self.watcher)?;
+                let mesh = closed(&file, RepairCells::of(self.options), self.watcher)?;
                 self.mesh(&mesh, file.up_axis()?)?
             }
             Source::Image(file) => self.image(&file)?,
@@ -691,7 +709,7 @@ impl<'a> Reader<'a> {
         let outline = Outline::of_image(&image, side)?.smoothed(tones.raster())?;
         let distance = outline.distance();
         let grids = Grids::usual(&IMAGE_CELLS);
-        let sides = outline.sides();
+        let sides = outline.sides(MOST_SEGMENTS);
         let grid = self.grid_holding(&image.bounding_box(), &grids, &distance, &sides)?;
         let field = stored_phase_field(grid, &distance, self.eps(&grid))?;
         Ok(Loaded::Plane(self.start(field, plane)?))

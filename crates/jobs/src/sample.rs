@@ -2,7 +2,7 @@
 
 use volumes::Volume;
 
-use crate::input::{InitialShape, Loaded, Reader, Source, check_phases, closed};
+use crate::input::{InitialShape, Loaded, Reader, RepairCells, Source, check_phases, closed};
 use crate::options::SampleOptions;
 use crate::paths::{MESHES, extension};
 use crate::prelude::*;
@@ -25,14 +25,15 @@ pub fn sample(mut options: SampleOptions, watcher: &dyn Watcher) -> Result<()> {
     let as_it_is = is_mesh
         && !options.resample
         && options.without.is_empty()
-        && input.cells.is_none()
+        // Those of a repair are no others.
+        && (input.cells.is_none() || input.repair)
         && input.box_side.is_none()
         && input.side_length.is_none();
-    let repairs = input.repair;
+    let repairs = RepairCells::of(input);
     let mut reader = Reader::of(&mut options.input, EPS_OVER_H, watcher)?;
     if let (Source::Mesh(from), true) = (&reader.source, as_it_is) {
-        let mut mesh = if repairs {
-            closed(from, true, watcher)?.into_mesh()
+        let mut mesh = if repairs.is_some() {
+            closed(from, repairs, watcher)?.into_mesh()
         } else {
             from.mesh()?
         };

@@ -88,6 +88,24 @@ impl Overlap {
     }
 }
 
+/// The pairs of patches of faces that cross or touch each other, each once or more.
+pub(crate) fn touching(mesh: &TriangleMesh, patch: &[usize]) -> Vec<[usize; 2]> {
+    let boxes = Boxes::new(mesh);
+    let faces = (0..mesh.faces.len()).into_par_iter();
+    let pairs = faces.map(|face| {
+        let mut found: Vec<[usize; 2]> = Vec::new();
+        boxes.any(face, |other| {
+            let pair = [patch[face], patch[other]];
+            if pair[0] < pair[1] && !found.contains(&pair) && boxes.overlap(face, other) {
+                found.push(pair);
+            }
+            false
+        });
+        found
+    });
+    pairs.collect::<Vec<_>>().concat()
+}
+
 /// Boxes around all faces, around halves of them, and so on.
 struct Boxes<'a> {
     mesh: &'a TriangleMesh,

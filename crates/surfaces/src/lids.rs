@@ -111,7 +111,7 @@ impl<'a> Rims<'a> {
                 around.push(edge[0]);
             }
             around.reverse();
-            loops.push(around);
+            loops.extend(simple(&around));
         }
         loops
     }
@@ -127,6 +127,24 @@ impl<'a> Rims<'a> {
             from = to;
         }
     }
+}
+
+/// The rims of which one consists that goes through some vertices several times: holes that meet there.
+fn simple(around: &[u32]) -> Vec<Vec<u32>> {
+    let (mut rims, mut open): (Vec<Vec<u32>>, Vec<u32>) = (Vec::new(), Vec::new());
+    let mut place: HashMap<u32, usize> = HashMap::new();
+    for &vertex in around {
+        if let Some(&first) = place.get(&vertex) {
+            let rim = open.split_off(first);
+            rim.iter().for_each(|v| _ = place.remove(v));
+            rims.push(rim);
+        }
+        place.insert(vertex, open.len());
+        open.push(vertex);
+    }
+    rims.push(open);
+    rims.retain(|rim| rim.len() > 2);
+    rims
 }
 
 /// Adds a lid along the vertices of a hole: rings of fewer and fewer vertices, on straight lines to the middle.

@@ -250,7 +250,7 @@ fn root(first: &mut [usize], mut vertex: usize) -> usize {
 }
 
 /// Leaves out all but one of faces on the same vertices, and both of those that are each other's back; returns how many.
-fn without_doubles(mesh: &mut TriangleMesh) -> usize {
+pub(crate) fn without_doubles(mesh: &mut TriangleMesh) -> usize {
     let sorted = |face: &[u32; 3]| {
         let mut sorted = *face;
         sorted.sort_unstable();
@@ -281,7 +281,7 @@ fn without_doubles(mesh: &mut TriangleMesh) -> usize {
 }
 
 /// Flips the longest sides of faces without area, until all have some; returns how many had none. None if that does not help.
-fn flipped(mesh: &mut TriangleMesh) -> Option<usize> {
+pub(crate) fn flipped(mesh: &mut TriangleMesh) -> Option<usize> {
     let count = |mesh: &TriangleMesh| mesh.faces.iter().filter(|f| is_flat(mesh, **f)).count();
     let flat = count(mesh);
     for _ in 0..ROUNDS {

@@ -135,3 +135,58 @@ fn a_closed_mesh_stays_as_it_is() {
     let refused = repair(&sheet, 32).unwrap_err().to_string();
     assert!(refused.contains("encloses nothing"), "{refused}");
 }
+
+/// A joint that is far narrower than a cell, and a hole of one triangle: nothing but this hole changes.
+#[test]
+fn bodies_that_are_apart_stay_apart() {
+    let ball = |x: f64| translated(crate::common::sphere([0.0; 3], 5.0, 3), [x, 0.0, 0.0]);
+    let mut bones = together(ball(0.0), &ball(10.02));
+    let whole = bones.clone();
+    bones.faces.remove(100);
+    let repaired = repair(&bones, 64).unwrap();
+    assert_eq!(repaired.mesh.components(), 2);
+    let changes = repaired.changes;
+    assert!(changes.spacing > 5.0 * 0.02);
+    assert_eq!((changes.holes, changes.anew, changes.united), (1, 0, 0));
+    assert_eq!(repaired.mesh.mesh().vertices.len(), whole.vertices.len());
+    let exact = ClosedMesh::new(whole).unwrap().0.volume();
+    assert!((repaired.mesh.volume() / exact - 1.0).abs() < 1e-12);
+    assert!(
+        changes
+            .to_string()
+            .contains("1 holes were closed by smooth lids"),
+        "{changes}"
+    );
+    // Those that reach into each other are one, beside which a third one stays as it is.
+    let three = together(together(ball(0.0), &ball(8.0)), &ball(18.1));
+    let repaired = repair(&three, 64).unwrap();
+    let changes = repaired.changes;
+    assert_eq!((changes.holes, changes.anew, changes.united), (0, 1, 1));
+    assert_eq!(repaired.mesh.components(), 2);
+    // A body in a body is no cavity, which is told.
+    let inner = together(ball(0.0), &crate::common::sphere([0.0; 3], 2.0, 2));
+    let repaired = repair(&inner, 64).unwrap();
+    assert_eq!(
+        (repaired.mesh.components(), repaired.changes.left_out),
+        (1, 1)
+    );
+    let cavity = together(
+        ball(0.0),
+        &reversed(crate::common::sphere([0.0; 3], 2.0, 2)),
+    );
+    assert_eq!(repair(&cavity, 64).unwrap().mesh.components(), 2);
+    assert_eq!(repair(&reversed(cavity), 64).unwrap().mesh.components(), 2);
+}
+
+#[test]
+fn holes_are_filled_round() {
+    let open = with_hole(
+        &crate::common::sphere([0.0; 3], 1.0, 4),
+        [1.0, 0.0, 0.0],
+        0.5,
+    );
+    let repaired = repair(&open, 64).unwrap();
+    let (low, high) = radii(&repaired.mesh);
+    // A flat lid would be at 0.88.
+    assert!(low > 0.995 && high < 1.02, "{low} {high}");
+}
