@@ -9,6 +9,7 @@ mod examples;
 #[cfg(unix)]
 mod killed;
 mod library;
+mod meshes;
 mod messages;
 mod options;
 mod own;

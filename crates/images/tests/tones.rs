@@ -60,7 +60,7 @@ fn smoothed_outlines_have_the_length_of_the_shape_and_stay_near() {
     assert!(rough.smoothed(0.0).is_err());
     // Sides are as long as the outline, with normals of length 1.
     let sides: f64 = smooth
-        .sides()
+        .sides(usize::MAX)
         .map(|(_, n, side)| n[0].hypot(n[1]) * side)
         .sum();
     assert!((sides / length - 1.0).abs() < 1e-12);

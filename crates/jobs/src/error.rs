@@ -336,13 +336,16 @@ impl Error {
     }
 
     pub(crate) fn repairable(error: surfaces::Error, vertices_follow: bool) -> Self {
-        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap};
+        use surfaces::Error::{
+            LidCrosses, MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap,
+        };
         match error {
             Open { .. }
             | NonManifold { .. }
             | MixedOrientation { .. }
             | Nesting { .. }
             | Overlap(_)
+            | LidCrosses { .. }
             | NoArea { .. } => Self::Repairable {
                 error,
                 vertices_follow,

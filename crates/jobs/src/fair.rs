@@ -21,6 +21,8 @@ const FARTHEST: f64 = 0.35;
 
 /// Where more than this part of the vertices is flat, edges may have been taken for noise.
 const FLAT: f64 = 0.05;
+/// Less noise than this part of the longest side is taken off also where it may be the shape, which hardly moves.
+const LITTLE: f64 = 1e-4;
 
 impl FairOptions {
     /// Whether it ends as soon as something is reached, which must not be jumped over.
@@ -60,6 +62,9 @@ impl FairOptions {
         if self.max_distance.is_some() && !is_bounded {
             let what = "an input that is neither a mesh nor a segmentation";
             return Err(Error::foreign("max_distance", "", what));
+        }
+        if reader.is_planar()? {
+            return Err(Refusal::FairInPlane.into());
         }
         let loaded = match reader.source.clone() {
             Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
@@ -128,8 +133,7 @@ impl FairOptions {
             reduced_volume,
             ..
         } = self.willmore;
-        let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone())?;
-        own.is_new = self.remesh;
+        let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone(), self.remesh)?;
         own.max_distance = self.max_distance;
         own.check_movable(path)?;
         own.keeps_volume = volume == Some(SizeTarget::Keep);
@@ -148,6 +152,13 @@ impl FairOptions {
             let noise = own.fairing().noise;
             if noise == 0.0 {
                 return Err(Refusal::NoNoise.into());
+            }
+            let longest_side = own.rough().bounding_box().longest_side();
+            if noise > LITTLE * longest_side && !own.shows_noise() {
+                return Err(Refusal::NoiseOfShape {
+                    percent: 100.0 * noise / longest_side,
+                }
+                .into());
             }
             watcher.note(&Note::Noise {
                 noise,

@@ -125,7 +125,7 @@ const MOST_LOST: f64 = 0.25;
 /// Rays by which the thickness of a mesh is measured.
 const MOST_RAYS: usize = 4096;
 /// Segments of an outline by which its thickness is measured.
-const MOST_SEGMENTS: usize = 1 << 16;
+const MOST_SEGMENTS: usize = 1 << 14;
 /// Cells along a mesh that is repaired, unless `cells` says how many.
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.
@@ -355,6 +355,11 @@ impl<'a> Reader<'a> {
         })
     }
 
+    /// Whether it is a shape in the plane.
+    pub fn is_planar(&self) -> Result<bool> {
+        self.source.is_planar()
+    }
+
     pub fn load(&mut self) -> Result<Loaded> {
         let is_planar = self.source.is_planar()?;
         Ok(match self.source.clone() {
@@ -435,6 +440,28 @@ impl<'a> Reader<'a> {
         Ok(attempt(self)?.0)
     }
 
+    /// Whether most of a shape is too thin even for the finest of some grids, by a part of its sides: then the others need not be tried.
+    fn is_hopeless<const D: usize>(
+        &mut self,
+        bounds: &BoundingBox<D>,
+        grids: &Grids,
+        shape: &(impl SignedDistance<D> + ?Sized),
+        sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
+    ) -> Result<bool> {
+        /// At most so many sides.
+        const TRIED: usize = 1024;
+        let (cells, side_length) = (self.options.cells, self.options.side_length);
+        if self.chosen.is_some() {
+            return Ok(false);
+        }
+        self.options.cells = grids.cells.last().copied();
+        let grid = self.grid_around(bounds, grids.part)?;
+        (self.options.cells, self.options.side_length) = (cells, side_length);
+        let step = sides.clone().count().div_ceil(TRIED).max(1);
+        let tried = sides.clone().step_by(step);
+        Ok(thin_part(shape, tried, self.thin_below(&grid)) > 2.0 * MOST_LOST)
+    }
+
     /// The coarsest of some grids about a shape that is fine enough and holds its thin parts and gaps, or the one that was chosen.
     fn grid_holding<const D: usize>(
         &mut self,
@@ -443,7 +470,13 @@ impl<'a> Reader<'a> {
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>> {
-        let (grid, thin) = self.first_good(grids.cells, |reader| {
+        let finest = grids.cells.len() - 1;
+        let cells = if self.is_hopeless(bounds, grids, shape, sides)? {
+            &grids.cells[finest..]
+        } else {
+            grids.cells
+        };
+        let (grid, thin) = self.first_good(cells, |reader| {
             let grid = reader.grid_around(bounds, grids.part)?;
             let is_coarse = (grids.spacing)
                 .is_some_and(|(most, cells)| grid.spacing() > most && reader.cells() < cells);
@@ -592,7 +625,7 @@ impl<'a> Reader<'a> {
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);
         let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
-        self.tell_thin(thin, grid, !own.is_new, false)?;
+        self.tell_thin(thin, grid, !own.is_new, self.chosen.is_none())?;
         self.watcher.note(&Note::Grid {
             cells: self.cells(),
             spacing: grid.spacing(),

@@ -1,6 +1,7 @@
 //! What came out of a job.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use engine::Helfrich;
 use pages::five_digits;
@@ -14,6 +15,10 @@ pub(crate) const SIZES: [&str; 3] = ["length", "area", "volume"];
 
 /// The energy of a surface over that of a sphere is not below this but for errors of the grid.
 const NO_SURFACE: f64 = 0.95;
+/// and one that began above this part and ends below it is not resolved.
+const UNRESOLVED: f64 = 0.995;
+/// A change of the area, in percent, that is more than what makes a drawing smooth.
+const SWOLLEN: f64 = 50.0;
 /// More than this part of the vertices, in percent, that could not follow is told.
 const LEFT_BEHIND: f64 = 1.0;
 
@@ -264,6 +269,27 @@ impl Summary {
                         .is_some_and(|spheres| spheres < NO_SURFACE),
                 "no closed surface has so little energy: the shape is near to its own periodic image, and a smaller `side_length` gives it room",
             ),
+            (
+                self.energy_terms.is_none()
+                    && self
+                        .energy_over_8_pi
+                        .is_some_and(|spheres| spheres < UNRESOLVED)
+                    && self
+                        .first_energy
+                        .is_some_and(|first| first >= UNRESOLVED * 8.0 * PI)
+                    && self
+                        .energy_over_8_pi
+                        .is_some_and(|spheres| spheres >= NO_SURFACE),
+                "the energy has fallen below that of a sphere, which has the least: the grid is too coarse for so long a flow, in which the shape grows, \
+                 and more `cells` help",
+            ),
+            (
+                self.measure("length").is_some()
+                    && self
+                        .measure("area_change_percent")
+                        .is_some_and(|percent| percent.abs() > SWOLLEN),
+                "the enclosed area has changed by more than half, as that of thin strokes does: a shorter `time`, or `area` keep, keeps more of the shape",
+            ),
         ];
         let holding = notes.into_iter().filter(|(holds, _)| *holds);
         holding.map(|(_, note)| note).collect()
@@ -277,6 +303,7 @@ fn of_mesh(mesh: &MeshReport) -> String {
     };
     let sizes = match (mesh.volume_change_percent, mesh.area_change_percent) {
         (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
+        _ if mesh.is_open => "the boundary has not moved".to_owned(),
         _ => "the mesh is no longer closed, or folds over itself".to_owned(),
     };
     let bound = match (mesh.max_distance, mesh.vertices_at_max_distance) {

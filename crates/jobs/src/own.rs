@@ -1,10 +1,10 @@
 //! The mesh that a person gave: its vertices follow the flow.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Followed, Mended};
+use surfaces::{Bound, Covered, Followed, Mended};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -15,6 +15,8 @@ use crate::presentation::Known;
 
 /// The name of the copy of the input, without its extension.
 pub const INPUT: &str = "input";
+/// Rings of vertices beside a boundary that go on smoothly from it.
+const RINGS: usize = 4;
 
 /// A mesh of which everything but the positions of its vertices stays: see [`Fairing`].
 #[derive(Default, Serialize, Deserialize)]
@@ -46,6 +48,8 @@ struct Loaded {
     mesh: TriangleMesh,
     /// Where the mended mesh has its vertices.
     places: Vec<[f64; 3]>,
+    /// What is the surface and what are its lids, if it is open.
+    open: Option<OpenSurface>,
     /// The file of the mask, if that is a mesh.
     mask: Option<Vec<u8>>,
     /// The distance of what stays.
@@ -55,6 +59,57 @@ struct Loaded {
     followed: OnceLock<Followed>,
 }
 
+/// A surface with a boundary, which stays.
+struct OpenSurface {
+    /// How many vertices are its own,
+    vertices: usize,
+    /// and how many faces.
+    faces: usize,
+    /// The places of the vertices at its boundary.
+    rim: HashSet<[u64; 3]>,
+    noise: f64,
+}
+
+impl OpenSurface {
+    fn of(covered: &Covered) -> Self {
+        Self {
+            vertices: covered.vertices,
+            faces: covered.faces,
+            rim: covered.rim.iter().map(|x| key(*x)).collect(),
+            noise: covered.noise(),
+        }
+    }
+
+    /// Whether each vertex is within so many edges of the boundary, but not at it and not at a lid.
+    fn rings(&self, mesh: &TriangleMesh, count: usize) -> Vec<bool> {
+        let mut near: Vec<bool> = (mesh.vertices.iter().enumerate())
+            .map(|(vertex, x)| vertex < self.vertices && self.rim.contains(&key(*x)))
+            .collect();
+        let rim = near.clone();
+        for _ in 0..count {
+            let before = near.clone();
+            for face in &mesh.faces[..self.faces] {
+                if face.iter().any(|&v| before[v as usize]) {
+                    face.iter().for_each(|&v| near[v as usize] = true);
+                }
+            }
+        }
+        near.iter()
+            .zip(rim)
+            .map(|(near, rim)| *near && !rim)
+            .collect()
+    }
+
+    /// The surface alone.
+    fn without_lids(&self, mesh: &TriangleMesh) -> TriangleMesh {
+        TriangleMesh {
+            vertices: mesh.vertices[..self.vertices].to_vec(),
+            faces: mesh.faces[..self.faces].to_vec(),
+            normals: None,
+        }
+    }
+}
+
 impl OwnMesh {
     /// Takes a mesh, and what noise is to be taken off, estimated unless it is given; without any vertices simply follow.
     pub fn new(
@@ -62,8 +117,10 @@ impl OwnMesh {
         bytes: Vec<u8>,
         noise: Option<f64>,
         keep: Option<String>,
+        is_new: bool,
     ) -> Result<(Self, Vec<surfaces::Warning>)> {
         let mut own = Self {
+            is_new,
             file: format!("{INPUT}.{}", extension(path)),
             noise: noise.unwrap_or(f64::NAN),
             keep,
@@ -98,25 +155,31 @@ impl OwnMesh {
         mask: Option<Vec<u8>>,
     ) -> Result<Vec<surfaces::Warning>> {
         let mesh = surfaces::decode(&bytes, path)?;
-        let mended = ClosedMesh::mended(mesh.clone()).map_err(Error::own_mesh)?;
+        let (mended, open) = self.closed(&mesh)?;
         let Mended {
             mesh: closed,
             changes,
             places,
         } = mended;
         if self.noise.is_nan() {
-            self.noise = closed.mesh().noise();
+            self.noise = open
+                .as_ref()
+                .map_or_else(|| closed.mesh().noise(), |open| open.noise);
         }
         let keep = self.keep.as_deref();
         let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, &bytes, &self.file));
         let keep = keep.transpose()?;
-        let stays = |x| matches!(&keep, Some(keep) if keep.signed_distance(x) <= 0.0);
-        let fairing = Fairing::new(closed, self.noise, stays);
+        let chosen = |x| matches!(&keep, Some(keep) if keep.signed_distance(x) <= 0.0);
+        let stays = |x| chosen(x) || open.as_ref().is_some_and(|open| open.rim.contains(&key(x)));
+        let lids = open
+            .as_ref()
+            .map_or(0, |open| closed.mesh().vertices.len() - open.vertices);
+        let fairing = Fairing::with_lids(closed, self.noise, stays, lids);
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
             return Err(Refusal::KeepsAll.into());
         }
-        if keep.is_some() && kept == 0 {
+        if keep.is_some() && !mesh.vertices.iter().any(|x| chosen(*x)) {
             let bounds = fairing.rough.bounding_box();
             return Err(Refusal::KeepsNothing {
                 lower: bounds.lower,
@@ -128,12 +191,25 @@ impl OwnMesh {
             bytes,
             mesh,
             places,
+            open,
             mask,
             keep,
             fairing,
             followed: OnceLock::new(),
         }));
         Ok(changes)
+    }
+
+    /// A closed mesh of one that may be open, if its vertices follow the flow.
+    fn closed(&self, mesh: &TriangleMesh) -> Result<(Mended, Option<OpenSurface>)> {
+        match ClosedMesh::mended(mesh.clone()) {
+            Err(surfaces::Error::Open { .. }) if !self.is_new => {
+                let covered = ClosedMesh::covered(mesh.clone()).map_err(Error::own_mesh)?;
+                let open = OpenSurface::of(&covered);
+                Ok((covered.mended, Some(open)))
+            }
+            mended => Ok((mended.map_err(Error::own_mesh)?, None)),
+        }
     }
 
     fn loaded(&self) -> &Loaded {
@@ -168,6 +244,14 @@ impl OwnMesh {
             Err(other) => Err(Error::own_mesh(other)),
             Ok(_) => Ok(()),
         }
+    }
+
+    /// Whether what looks like noise is noise, and not the shape.
+    pub fn shows_noise(&self) -> bool {
+        let surface = self.loaded().open.as_ref().map(|open| open.vertices);
+        self.rough()
+            .mesh()
+            .shows_noise(surface.unwrap_or(usize::MAX))
     }
 
     /// What becomes of the vertices.
@@ -260,6 +344,23 @@ impl OwnMesh {
         let fairing = self.fairing();
         let followed = self.followed(start, eps)?;
         let mut moved = fairing.faired(followed, u)?;
+        let open = self.loaded().open.as_ref();
+        if let Some(open) = open {
+            // The boundary has its noise, which the surface beside it follows.
+            let mut rings = open.rings(rough.mesh(), RINGS);
+            rings
+                .iter_mut()
+                .zip(&fairing.kept)
+                .for_each(|(free, kept)| *free &= !kept);
+            let normals = moved.vertex_normals();
+            let faired = moved.vertices.clone();
+            moved.bend_least(&rings);
+            // Along the surface vertices stay where they were.
+            for ((x, from), normal) in moved.vertices.iter_mut().zip(&faired).zip(&normals) {
+                let along: f64 = (0..3).map(|i| (x[i] - from[i]) * normal[i]).sum();
+                *x = [0, 1, 2].map(|i| from[i] + along * normal[i]);
+            }
+        }
         let volume = match (self.keeps_volume, self.drives_volume) {
             (true, _) => Some(rough.volume()),
             (_, true) => Some(ZeroSet::of(u, eps)?.volume),
@@ -267,6 +368,7 @@ impl OwnMesh {
         };
         let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
         moved = self.bounded(moved, volume, &free);
+        moved = moved.untangled(rough.mesh());
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
@@ -290,20 +392,32 @@ impl OwnMesh {
             faces: mesh.faces.clone(),
             normals: None,
         };
-        let lost = fairing.unresolved(followed, thinnest(start.grid()));
+        let mut lost = fairing.unresolved(followed, thinnest(start.grid()));
+        let mut lengths = lengths;
+        let mut shown = moved.clone();
+        if let Some(open) = open {
+            lengths.truncate(open.vertices);
+            lost.truncate(open.vertices);
+            shown = open.without_lids(&moved);
+        }
         let mut report = MeshReport {
             noise: Some(self.noise),
             left_behind_percent: Some(100.0 * followed.left_behind(u)?),
             ..MeshReport::new(rough, &moved, &lengths)
         };
+        if open.is_some() {
+            // What lids enclose is no size of the surface.
+            (report.volume_change_percent, report.area_change_percent) = (None, None);
+            report.is_open = true;
+        }
         if let Some(length) = self.max_distance {
-            let distances = MeshDistance::new(rough).signed_distances(&moved.vertices);
+            let distances = MeshDistance::new(rough).signed_distances(&shown.vertices);
             let distances: Vec<f64> = distances.into_iter().map(f64::abs).collect();
             report.bound(length, &distances);
         }
         Ok(Faired {
             displacement: Displacement {
-                mesh: moved,
+                mesh: shown,
                 lengths,
                 lost,
                 up,

@@ -84,6 +84,15 @@ pub enum Refusal {
          `energy_ratio`, `time`, `energy` or `steps`"
     )]
     NoNoise,
+    /// What looks like noise is the shape.
+    #[error(
+        "no noise was found: {percent:.2} % of the longest side, as much as the vertices are off the middle of those around them, is the shape itself, with \
+         its edges and few faces: give `noise` LENGTH, or say how smooth the surface is to become, by `energy_ratio`, `time`, `energy` or `steps`"
+    )]
+    NoiseOfShape {
+        /// What it would be, in percent of the longest side.
+        percent: f64,
+    },
     /// Noise, where the volume is to change.
     #[error(
         "the volume stays where noise is taken off: leave out `volume` and `reduced_volume`, or `noise` and say how smooth the surface is \

@@ -230,6 +230,10 @@ const NUMBERS: [(&str, &str); 24] = [
         "This distance, in percent of the longest side",
     ),
     (
+        "/mesh/is_open",
+        "Does the mesh have a boundary, which did not move?",
+    ),
+    (
         "/mesh/max_distance",
         "How far from the surface before vertices may be, in units of the input",
     ),

@@ -50,6 +50,9 @@ pub enum Warning {
     /// So many faces had their corners on a line.
     #[display("{_0} faces without area gave their longest sides to their neighbours")]
     Flat(usize),
+    /// So many holes have lids.
+    #[display("{_0} holes were closed by smooth lids")]
+    Lids(usize),
     /// So many parts are oriented outwards within others.
     #[display(
         "{_0} parts lie within others without being turned inwards: the flow sees these bodies as cavities"

@@ -44,6 +44,51 @@ impl TriangleMesh {
     }
 }
 
+impl TriangleMesh {
+    /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
+    /// there: in the end at their old places. So no face crosses others that did not before.
+    #[must_use]
+    pub fn untangled(mut self, before: &Self) -> Self {
+        /// Rounds in which such vertices go half of their way back, before they and more and more of their neighbours go all of it.
+        const HALVINGS: usize = 4;
+        const ROUNDS: usize = 12;
+        let crossed = before.crossing_faces();
+        for round in 0..ROUNDS {
+            let crosses = self.crossing_faces();
+            let mut goes_back = vec![false; self.vertices.len()];
+            let tangled = (self.faces.iter().zip(&crosses).zip(&crossed))
+                .filter(|((_, now), before)| **now && !**before);
+            for ((face, _), _) in tangled {
+                face.iter().for_each(|&v| goes_back[v as usize] = true);
+            }
+            if !goes_back.contains(&true) {
+                return self;
+            }
+            for _ in 0..round.saturating_sub(HALVINGS) {
+                let near = goes_back.clone();
+                for face in self
+                    .faces
+                    .iter()
+                    .filter(|f| f.iter().any(|&v| near[v as usize]))
+                {
+                    face.iter().for_each(|&v| goes_back[v as usize] = true);
+                }
+            }
+            let part = if round < HALVINGS { 0.5 } else { 0.0 };
+            let pairs = self
+                .vertices
+                .iter_mut()
+                .zip(&before.vertices)
+                .zip(goes_back);
+            for ((x, from), _) in pairs.filter(|(_, goes_back)| *goes_back) {
+                *x = [0, 1, 2].map(|i| from[i] + part * (x[i] - from[i]));
+            }
+        }
+        // Knots that are larger than that are rare.
+        before.clone()
+    }
+}
+
 impl ClosedMesh {
     /// The parts that overlap, if some do: where they do, the mesh does not say what is inside.
     pub fn overlap(&self) -> Option<Overlap> {

@@ -119,6 +119,14 @@ pub enum Error {
          and outside cannot be told apart"
     )]
     NoVolume { volume: f64, area: f64 },
+    #[error(
+        "the surface is open, and lids on its {holes} holes would cross it or lie on it ({faces} faces): close the holes"
+    )]
+    LidCrosses {
+        holes: usize,
+        /// Faces that cross others only with lids.
+        faces: usize,
+    },
     #[error("{0}")]
     Overlap(Overlap),
     #[error(

@@ -57,6 +57,8 @@ pub struct Fairing {
     pub noise: f64,
     /// Whether a vertex stays.
     pub kept: Vec<bool>,
+    /// How many vertices at the end belong to lids, which are no part of what is faired.
+    pub lids: usize,
 }
 
 /// The vertices of the start of a fairing in the box of a grid.
@@ -81,19 +83,40 @@ impl Fairing {
     /// Of a mesh with noise of this standard deviation along its normals, see [`TriangleMesh::noise`]; zero for none. `kept` says of a
     /// position whether its vertex stays.
     pub fn new(rough: ClosedMesh, noise: f64, kept: impl Fn([f64; 3]) -> bool) -> Self {
-        let kept: Vec<bool> = rough.mesh().vertices.iter().map(|&x| kept(x)).collect();
+        Self::with_lids(rough, noise, kept, 0)
+    }
+
+    /// The same of a surface whose last vertices belong to lids, and stay.
+    pub fn with_lids(
+        rough: ClosedMesh,
+        noise: f64,
+        kept: impl Fn([f64; 3]) -> bool,
+        lids: usize,
+    ) -> Self {
+        let vertices = &rough.mesh().vertices;
+        let surface = vertices.len() - lids;
+        let kept: Vec<bool> = (vertices.iter().enumerate())
+            .map(|(vertex, &x)| vertex >= surface || kept(x))
+            .collect();
         Self {
-            start: without_short_waves(&rough, noise, &kept),
+            start: without_short_waves(&rough, noise, &kept, surface),
             noise,
             kept,
             rough,
+            lids,
         }
+    }
+
+    /// How many vertices belong to no lid.
+    fn surface(&self) -> usize {
+        self.kept.len() - self.lids
     }
 
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
     pub fn time(&self, spacing: f64, scale: f64) -> f64 {
         let edge = scale * self.rough.mesh().mean_edge();
-        let is_beyond = self.noise > BEYOND * self.rough.mesh().noise();
+        let found = self.rough.mesh().noise_of_first(self.surface());
+        let is_beyond = self.noise > BEYOND * found;
         let most = if is_beyond { TIME_BEYOND } else { TIME };
         most * (scale * self.noise).powi(2) * (edge * edge + spacing * spacing)
     }
@@ -161,7 +184,8 @@ impl Fairing {
         let now = self.faired(followed, u)?;
         let start = self.start.mesh();
         let displacements = along_normals(start, self.rough.mesh(), &now);
-        Ok(root_mean_square(&start.averaged(&displacements)))
+        let averaged = start.averaged(&displacements);
+        Ok(root_mean_square(&averaged[..self.surface()]))
     }
 
     /// The mesh, when the phase field is `u`.
@@ -212,13 +236,19 @@ impl Followed {
 
 /// As many rounds of Taubin's smoothing as move the vertices along the normals by no more than most of the noise, and along the surface,
 /// where it would make edges alike, by no more than noise does; those that are kept stay.
-fn without_short_waves(rough: &ClosedMesh, noise: f64, kept: &[bool]) -> ClosedMesh {
+fn without_short_waves(
+    rough: &ClosedMesh,
+    noise: f64,
+    kept: &[bool],
+    surface: usize,
+) -> ClosedMesh {
     let mut smooth = rough.clone();
     for _ in 0..ROUNDS {
         let mut next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
         hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
         hold(&mut next, rough.mesh(), kept);
-        let moved = root_mean_square(&along_normals(&next, rough.mesh(), &next));
+        let moved = along_normals(&next, rough.mesh(), &next);
+        let moved = root_mean_square(&moved[..surface]);
         match ClosedMesh::new(next) {
             Ok((next, _)) if moved <= SMOOTHED * noise => smooth = next,
             // Also where slivers lose their area.

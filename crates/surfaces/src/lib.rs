@@ -97,7 +97,7 @@ pub use format::{up_axis, up_axis_of, usual_up_axis};
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use label_mesh::{BACKGROUND, Depths, LabelLattice, LabelMesh};
 pub use lids::Lids;
-pub use mending::Mended;
+pub use mending::{Covered, Mended};
 pub use mesh::TriangleMesh;
 pub use parts::Parts;
 pub use read::error::FormatError;

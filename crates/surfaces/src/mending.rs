@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::closed::{Depths, Seams, has_no_area, is_flat};
+use crate::closed::{Depths, Seams, drop_unreferenced, has_no_area, is_flat};
 use crate::half_edges::HalfEdges;
 use crate::mesh::has_three_corners;
 use crate::repair::orient;
@@ -72,6 +72,70 @@ impl ClosedMesh {
     }
 }
 
+/// An open surface with lids on its holes.
+#[derive(Clone, Debug)]
+pub struct Covered {
+    /// The closed mesh: the surface comes first, and then its lids.
+    pub mended: Mended,
+    /// How many vertices are those of the surface,
+    pub vertices: usize,
+    /// and how many faces.
+    pub faces: usize,
+    /// The places of the vertices at its holes.
+    pub rim: Vec<[f64; 3]>,
+}
+
+impl Covered {
+    /// The standard deviation of the noise of the surface, as [`TriangleMesh::noise`].
+    pub fn noise(&self) -> f64 {
+        self.mended.mesh.mesh().noise_of_first(self.vertices)
+    }
+}
+
+impl ClosedMesh {
+    /// An open surface with [lids](TriangleMesh::with_lids) on its holes, which is mended where exact coordinates and the neighbours of faces say how.
+    ///
+    /// # Errors
+    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`].
+    pub fn covered(mesh: TriangleMesh) -> Result<Covered, Error> {
+        let mut mending = Mending::of(mesh);
+        mending.merge();
+        let doubled = without_doubles(&mut mending.mesh);
+        mending.note(doubled, Warning::Doubled);
+        let turned = orient(&mut mending.mesh.faces);
+        mending.note(turned, Warning::Turned);
+        let unreferenced = drop_unreferenced(&mut mending.mesh);
+        mending.note(unreferenced, Warning::Unreferenced);
+        let surface = mending.mesh;
+        has_no_area(&surface)?;
+        let lids = surface.with_lids()?;
+        let crossing = |mesh: &TriangleMesh| mesh.crossing_faces().iter().filter(|c| **c).count();
+        let faces = crossing(&lids.mesh).saturating_sub(crossing(&surface));
+        let holes = lids.holes;
+        let (mesh, more) = match Self::new(lids.mesh) {
+            // A lid on what is flat lies on it.
+            Err(Error::NoVolume { .. }) => return Err(Error::LidCrosses { holes, faces }),
+            Ok(_) if faces > 0 => return Err(Error::LidCrosses { holes, faces }),
+            closed => closed?,
+        };
+        mending.changes.extend(more);
+        if holes > 0 {
+            mending.changes.push(Warning::Lids(holes));
+        }
+        let rim = surface.vertices.iter().zip(&lids.rim);
+        Ok(Covered {
+            vertices: surface.vertices.len(),
+            faces: surface.faces.len(),
+            rim: rim.filter(|(_, at)| **at).map(|(x, _)| *x).collect(),
+            mended: Mended {
+                mesh,
+                changes: mending.changes,
+                places: mending.places,
+            },
+        })
+    }
+}
+
 struct Mending {
     mesh: TriangleMesh,
     changes: Vec<Warning>,
@@ -87,14 +151,19 @@ impl Mending {
         }
     }
 
-    /// With every edge between two faces, which agree.
-    fn sheets(mut self) -> Option<Self> {
+    /// Makes vertices at exactly the same place one.
+    fn merge(&mut self) {
         let exact = self.mesh.merged();
         let merged = self.mesh.vertices.len() - exact.vertices.len();
         let collapsed = self.mesh.faces.len() - exact.faces.len();
         self.note(merged, Warning::Merged);
         self.note(collapsed, Warning::Collapsed);
         self.mesh = exact;
+    }
+
+    /// With every edge between two faces, which agree.
+    fn sheets(mut self) -> Option<Self> {
+        self.merge();
         self = self.joined()?;
         let flat = flipped(&mut self.mesh)?;
         self.note(flat, Warning::Flat);

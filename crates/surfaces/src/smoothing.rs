@@ -213,6 +213,11 @@ impl TriangleMesh {
     /// distribution, and the median takes away what bends in few places, such as edges. A surface without noise has a
     /// small one, by its curvature. Zero for a mesh without faces.
     pub fn noise(&self) -> f64 {
+        self.noise_of_first(self.vertices.len())
+    }
+
+    /// The same of the first vertices alone, where others belong to lids.
+    pub(crate) fn noise_of_first(&self, count: usize) -> f64 {
         let umbrellas = Umbrellas::of(self);
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
         let normals = self.smoothed(12, TAUBIN[0], TAUBIN[1]).vertex_normals();
@@ -222,7 +227,8 @@ impl TriangleMesh {
             .map(|square| Vector::new(square.unwrap_or(0.0), 0.0, 0.0))
             .collect();
         umbrellas.smooth(&mut squares, AVERAGING, [0.5, 0.0]);
-        let means = squares.iter().zip(&found).filter(|(_, at)| at.is_some());
+        let means = squares.iter().zip(&found).take(count);
+        let means = means.filter(|(_, at)| at.is_some());
         let mut means: Vec<f64> = means.map(|(mean, _)| mean.x).collect();
         if means.is_empty() {
             return 0.0;
@@ -230,6 +236,59 @@ impl TriangleMesh {
         let middle = means.len() / 2;
         let (_, median, _) = means.select_nth_unstable_by(middle, f64::total_cmp);
         median.sqrt() / MEDIAN_OF_MEANS
+    }
+
+    /// Whether the [noise](Self::noise) of the first `count` vertices is noise, and not the shape, of which a mesh without noise has some.
+    ///
+    /// Two signs tell the shape. Where it is smooth, and its polygons are few, the Laplacian `L` takes away most of it a second time, and nothing of noise:
+    /// the estimate by `n . L L x` is far below that by `n . L x`. Where it has edges between sides that are flat, half of the vertices have next to no
+    /// `n . L x`, and the mean over neighbours is that of the edges.
+    pub fn shows_noise(&self, count: usize) -> bool {
+        /// The least part of the one estimate in the other, which is 0.1 and less for smooth shapes without noise,
+        const ROUGH: f64 = 0.2;
+        /// and of the root of the median of squares in that of normal numbers, which is 0.13 and less for shapes with edges.
+        const EVERYWHERE: f64 = 0.2;
+        /// The median of the square of a normal number.
+        const MEDIAN: f64 = 0.455;
+        let umbrellas = Umbrellas::of(self);
+        let normals = self.smoothed(12, TAUBIN[0], TAUBIN[1]).vertex_normals();
+        let median = |mut values: Vec<f64>| -> f64 {
+            if values.is_empty() {
+                return 0.0;
+            }
+            let middle = values.len() / 2;
+            *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        let of_order = |order: usize| {
+            let squares = self.squared_order(&umbrellas, &normals, order);
+            let mut means: Vec<Vector> =
+                squares.iter().map(|&s| Vector::new(s, 0.0, 0.0)).collect();
+            umbrellas.smooth(&mut means, AVERAGING, [0.5, 0.0]);
+            let of_surface = squares.len().min(count);
+            let means = means[..of_surface].iter().map(|mean| mean.x).collect();
+            (median(squares[..of_surface].to_vec()), median(means))
+        };
+        let ((single, once), (_, twice)) = (of_order(1), of_order(2));
+        (twice / once).sqrt() >= ROUGH && (single / (MEDIAN * once)).sqrt() >= EVERYWHERE
+    }
+
+    /// `(n . L^k x)^2` at each vertex, divided by the sum of the squares of its coefficients, for one or two Laplacians.
+    fn squared_order(&self, umbrellas: &Umbrellas, normals: &[[f64; 3]], order: usize) -> Vec<f64> {
+        if order == 2 {
+            let found = self.squared_noise(umbrellas, normals);
+            return found
+                .into_iter()
+                .map(|square| square.unwrap_or(0.0))
+                .collect();
+        }
+        let once = umbrellas.laplacian(&self.points());
+        let at = |(vertex, way): (usize, &Vector)| {
+            let along = way.dot(Vector::from_array(normals[vertex]));
+            // One, and as many equal parts of one as there are neighbours.
+            let weights = 1.0 + 1.0 / umbrellas.0[vertex].len().max(1) as f64;
+            along * along / weights
+        };
+        once.iter().enumerate().map(at).collect()
     }
 
     /// The part of the vertices at which `|n . L L x|`, scaled as for [`Self::noise`] and with their own normals, is at most a ten-thousandth

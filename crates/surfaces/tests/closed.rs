@@ -500,3 +500,25 @@ fn faces_that_cross_others_are_found() {
             >= 6
     );
 }
+
+/// A sheet that is moved through itself, and a vertex through the other side.
+#[test]
+fn what_crosses_only_now_goes_back() {
+    let ring = torus(0.5, 0.2, 30, 20);
+    let mut moved = ring.clone();
+    for x in &mut moved.vertices {
+        x[2] += 0.01;
+    }
+    assert_eq!(moved.clone().untangled(&ring), moved);
+    let free = moved.vertices[321];
+    moved.vertices[10] = [0.9, 0.0, 0.0];
+    moved.vertices[400] = [0.0; 3];
+    assert!(moved.crossing_faces().contains(&true));
+    let back = moved.untangled(&ring);
+    assert!(!back.crossing_faces().contains(&true));
+    assert_eq!(back.vertices[321], free);
+    // Faces that crossed before may go on to.
+    let mut folded = ring.clone();
+    folded.vertices[10] = [0.9, 0.0, 0.0];
+    assert_eq!(folded.clone().untangled(&folded), folded);
+}

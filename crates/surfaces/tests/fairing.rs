@@ -288,3 +288,57 @@ fn ply_and_stl_files_keep_everything_but_positions_and_normals() {
         "{text}"
     );
 }
+
+/// Exact shapes have none, however few their faces are, and noise of a tenth of an edge is seen on each of them.
+#[test]
+fn noise_is_told_from_edges_and_few_faces() {
+    let boxes = |levels: usize| {
+        let mut mesh = crate::common::cube(1.0);
+        for _ in 0..levels {
+            mesh = subdivided(&mesh);
+        }
+        mesh
+    };
+    for (name, mesh) in [
+        ("sphere 2", crate::common::sphere([0.0; 3], 1.0, 2)),
+        ("sphere 4", crate::common::sphere([0.0; 3], 1.0, 4)),
+        ("torus 20", crate::common::torus(1.0, 0.4, 20, 12)),
+        ("torus 40", crate::common::torus(1.0, 0.4, 40, 20)),
+        ("torus 100", crate::common::torus(1.0, 0.4, 100, 50)),
+        ("box 2", boxes(2)),
+        ("box 3", boxes(3)),
+        ("box 4", boxes(4)),
+    ] {
+        assert!(!mesh.shows_noise(usize::MAX), "{name}");
+        let mut rough = mesh.clone();
+        let edge = (4.0 * crate::common::closed(mesh.clone()).area()
+            / 3.0_f64.sqrt()
+            / mesh.faces.len() as f64)
+            .sqrt();
+        // Even noise of this size has a standard deviation of a tenth of an edge and a bit more.
+        rough.roughen(0.2 * edge, 1);
+        assert!(rough.shows_noise(usize::MAX), "{name} with noise");
+    }
+}
+
+/// Every face as four.
+fn subdivided(mesh: &surfaces::TriangleMesh) -> surfaces::TriangleMesh {
+    let mut fine = surfaces::TriangleMesh {
+        normals: None,
+        faces: Vec::new(),
+        ..mesh.clone()
+    };
+    let mut middles = std::collections::HashMap::new();
+    for &[a, b, c] in &mesh.faces {
+        let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[p, q]| {
+            *middles.entry([p.min(q), p.max(q)]).or_insert_with(|| {
+                let [x, y] = [p, q].map(|v| mesh.vertices[v as usize]);
+                fine.vertices.push([0, 1, 2].map(|i| 0.5 * (x[i] + y[i])));
+                fine.vertices.len() as u32 - 1
+            })
+        });
+        fine.faces
+            .extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    fine
+}

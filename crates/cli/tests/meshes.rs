@@ -1,0 +1,266 @@
+//! Meshes as they come: with trifling faults, open, thin, in several parts.
+
+use std::fs;
+use std::path::Path;
+
+use surfaces::TriangleMesh;
+
+use crate::common::{outcome, run, text};
+
+/// A ball of radius 10 with noise, and its faces about the top, which may be left out.
+fn ball(folder: &Path) -> TriangleMesh {
+    let sample = "sample builtin:sphere --cells 40 --noise 0.004 --save ball.ply";
+    outcome(folder, &sample.split(' ').collect::<Vec<_>>());
+    let mut mesh = surfaces::read(folder.join("ball.ply")).unwrap();
+    for x in mesh.vertices.as_flattened_mut() {
+        *x *= 40.0;
+    }
+    mesh.normals = None;
+    mesh
+}
+
+fn middle(mesh: &TriangleMesh, face: [u32; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| {
+        face.iter()
+            .map(|&v| mesh.vertices[v as usize][i])
+            .sum::<f64>()
+            / 3.0
+    })
+}
+
+/// What is left out or turned for the flow is in the file afterwards.
+#[test]
+fn trifles_are_mended_for_the_flow_and_kept_in_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = ball(folder.path());
+    let mut twice = whole.clone();
+    twice.faces.extend([whole.faces[9], whole.faces[9]]);
+    twice.faces[20].swap(0, 1);
+    surfaces::write(folder.path().join("twice.ply"), &twice).unwrap();
+    let arguments = "fair twice.ply --cells 32 --save out.ply";
+    let output = run(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    let said = text(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    for told in [
+        "2 faces that are there twice were left out",
+        "1 faces were turned round",
+    ] {
+        assert!(
+            said.contains(told) && said.contains("for the flow"),
+            "{said}"
+        );
+    }
+    let faired = surfaces::read(folder.path().join("out.ply")).unwrap();
+    assert_eq!(faired.faces, twice.faces);
+    assert_ne!(faired.vertices, twice.vertices);
+    // The same as without the trifles, but for those.
+    surfaces::write(folder.path().join("whole.ply"), &whole).unwrap();
+    let arguments = "fair whole.ply --cells 32 --save clean.ply";
+    outcome(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    let clean = surfaces::read(folder.path().join("clean.ply")).unwrap();
+    for (a, b) in faired.vertices.iter().zip(&clean.vertices) {
+        assert!((0..3).all(|i| (a[i] - b[i]).abs() < 1e-6), "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn the_boundary_of_an_open_surface_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut open = ball(folder.path());
+    let whole = open.clone();
+    open.faces.retain(|face| middle(&whole, *face)[2] < 8.5);
+    assert!(open.faces.len() < whole.faces.len());
+    surfaces::write(folder.path().join("open.ply"), &open).unwrap();
+    let arguments = "fair open.ply --cells 32 --save out.ply";
+    let made = outcome(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!(made["mesh"]["is_open"], true);
+    let faired = surfaces::read(folder.path().join("out.ply")).unwrap();
+    assert_eq!(faired.faces, open.faces);
+    let mut sides = std::collections::HashMap::new();
+    for face in &open.faces {
+        for i in 0..3 {
+            let (a, b) = (face[i], face[(i + 1) % 3]);
+            *sides.entry([a.min(b), a.max(b)]).or_insert(0) += 1;
+        }
+    }
+    let rim: Vec<u32> = (sides.iter().filter(|(_, count)| **count == 1))
+        .flat_map(|(edge, _)| *edge)
+        .collect();
+    assert!(rim.len() > 20);
+    for &v in &rim {
+        assert_eq!(faired.vertices[v as usize], open.vertices[v as usize]);
+    }
+    let off = |mesh: &TriangleMesh| -> f64 {
+        let used = mesh
+            .faces
+            .as_flattened()
+            .iter()
+            .map(|&v| mesh.vertices[v as usize]);
+        let off: Vec<f64> = used
+            .map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt())
+            .collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        (off.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt()
+    };
+    assert!(
+        off(&faired) < 0.6 * off(&open),
+        "{} {}",
+        off(&faired),
+        off(&open)
+    );
+    // A lid on a sheet would lie on it.
+    let sheet = TriangleMesh {
+        faces: whole
+            .faces
+            .iter()
+            .copied()
+            .filter(|face| middle(&whole, *face)[2] > 9.0)
+            .collect(),
+        vertices: whole.vertices.iter().map(|x| [x[0], x[1], 0.0]).collect(),
+        normals: None,
+    };
+    surfaces::write(folder.path().join("sheet.ply"), &sheet).unwrap();
+    let refused = run(folder.path(), &["fair", "sheet.ply", "--noise", "0.1"]);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("lids on its 1 holes would cross it or lie on it"),
+        "{error}"
+    );
+}
+
+#[test]
+fn bodies_that_overlap_are_refused_at_once_with_what_unites_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = ball(folder.path());
+    let mut both = one.clone();
+    let count = one.vertices.len() as u32;
+    both.vertices
+        .extend(one.vertices.iter().map(|x| [x[0] + 12.0, x[1], x[2]]));
+    both.faces
+        .extend(one.faces.iter().map(|face| face.map(|v| v + count)));
+    surfaces::write(folder.path().join("both.ply"), &both).unwrap();
+    let refused = run(folder.path(), &["fair", "both.ply"]);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("2 parts overlap") && error.contains("give --remesh and --repair"),
+        "{error}"
+    );
+    let arguments = "fair both.ply --remesh --repair --noise 0.1 --cells 48 --save one.ply";
+    let output = run(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("1 bodies that cross or touch each other were united"));
+}
+
+/// A sheet that is far thinner than a cell.
+#[test]
+fn what_is_thin_all_over_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut sheet = ball(folder.path());
+    for x in &mut sheet.vertices {
+        x[2] *= 0.002;
+    }
+    surfaces::write(folder.path().join("sheet.ply"), &sheet).unwrap();
+    let refused = run(folder.path(), &["fair", "sheet.ply", "--noise", "0.005"]);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("of the boundary is at parts or gaps thinner than"),
+        "{error}"
+    );
+    let arguments = "fair sheet.ply --noise 0.005 --allow-loss --steps 2 --save out.ply";
+    let output = run(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let crossing = |mesh: &TriangleMesh| mesh.crossing_faces().iter().filter(|c| **c).count();
+    let out = surfaces::read(folder.path().join("out.ply")).unwrap();
+    assert!(
+        crossing(&out) <= crossing(&sheet),
+        "{} {}",
+        crossing(&out),
+        crossing(&sheet)
+    );
+}
+
+/// The first refusal says what the second one would.
+#[test]
+fn a_drawing_is_not_faired_whatever_else_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome(
+        folder.path(),
+        &[
+            "sample",
+            "builtin:disc",
+            "--cells",
+            "32",
+            "--save",
+            "disc.png",
+        ],
+    );
+    for more in [&[][..], &["--energy-ratio", "0.5"], &["--noise", "1"]] {
+        let refused = run(folder.path(), &[&["fair", "disc.png"], more].concat());
+        let error = text(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{error}");
+        assert!(error.contains("there is `willmore flow`"), "{error}");
+    }
+}
+
+/// What the grid does not resolve grows, which is said.
+#[test]
+fn a_ball_that_grows_and_a_stroke_that_swells_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let ball = "flow ball:0,0,0,0.3 --cells 32 --steps 40";
+    let said = outcome_text(folder.path(), ball);
+    assert!(
+        said.contains("the energy has fallen below that of a sphere"),
+        "{said}"
+    );
+    let mut rows = vec![[255_u8; 3]; 200 * 60];
+    for (k, pixel) in rows.iter_mut().enumerate() {
+        let (x, y) = ((k % 200) as f64, (k / 200) as f64);
+        let near = (y - 30.0 - 12.0 * (x / 18.0).sin()).abs() < 2.5;
+        if near && (10.0..190.0).contains(&x) {
+            *pixel = [0; 3];
+        }
+    }
+    let opaque = rows.into_iter().map(|[r, g, b]| [r, g, b, 255]).collect();
+    let picture = render::Picture::new([200, 60], opaque).unwrap();
+    fs::write(folder.path().join("sign.png"), picture.to_png().unwrap()).unwrap();
+    let said = outcome_text(folder.path(), "flow sign.png --steps 1");
+    assert!(
+        said.contains("the enclosed area has changed by more than half"),
+        "{said}"
+    );
+}
+
+/// What a run prints for people.
+fn outcome_text(folder: &Path, arguments: &str) -> String {
+    let mut command = crate::common::program(folder);
+    let output = command.args(arguments.split(' ')).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// A drawing of a few bytes whose outline is a million pixels long is refused in seconds.
+#[test]
+fn a_drawing_of_stripes_is_refused_before_it_takes_long() {
+    let folder = tempfile::tempdir().unwrap();
+    let stripes = (0..1024 * 1024).map(|k| {
+        if (k / 1024) % 2 == 0 {
+            [0, 0, 0, 255]
+        } else {
+            [255; 4]
+        }
+    });
+    let picture = render::Picture::new([1024, 1024], stripes.collect()).unwrap();
+    fs::write(folder.path().join("stripes.png"), picture.to_png().unwrap()).unwrap();
+    let clock = std::time::Instant::now();
+    let refused = run(folder.path(), &["sample", "stripes.png", "--save", "o.png"]);
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("of the boundary is at parts or gaps thinner than"),
+        "{error}"
+    );
+    assert!(clock.elapsed().as_secs() < 30);
+}
