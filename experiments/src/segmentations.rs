@@ -3,6 +3,7 @@
 use chacha20::ChaCha8Rng;
 use geometry::shapes::{Capsule, Torus};
 use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
 use surfaces::{isosurface, samples};
 use volumes::{Inside, Values, Volume};
 
@@ -15,7 +16,7 @@ pub const WRONG: f64 = 0.15;
 /// Cells of the grid on which the area of a shape is measured.
 const AREA_CELLS: usize = 96;
 /// Points along a voxel at which volumes of places, gaps and overlaps are counted.
-const POINTS: usize = 3;
+const POINTS: usize = 2;
 
 type Shape = Box<dyn SignedDistance<3>>;
 
@@ -254,38 +255,29 @@ impl Segmentation {
         Ok(numbers)
     }
 
+    /// The root of the mean square distance of the surfaces to their shapes, a mean over the labels.
+    pub fn distance(&self, meshes: &[TriangleMesh]) -> f64 {
+        let pairs = meshes.iter().zip(&self.shapes);
+        let all = pairs.map(|(mesh, shape)| Nearness::of(mesh, &**shape).rms());
+        all.sum::<f64>() / meshes.len() as f64
+    }
+
     fn measured_label(&self, number: usize, mesh: &TriangleMesh) -> Numbers {
         let shape = &*self.shapes[number];
-        let (mut area, mut squares, mut angles, mut largest) = (0.0, 0.0, 0.0, 0.0_f64);
-        for face in &mesh.faces {
-            let corners = face.map(|vertex| mesh.vertices[vertex as usize]);
-            let middle: [f64; 3] =
-                std::array::from_fn(|i| corners.iter().map(|x| x[i]).sum::<f64>() / 3.0);
-            let [u, v] = [1, 2].map(|k: usize| [0, 1, 2].map(|i| corners[k][i] - corners[0][i]));
-            let cross = [0, 1, 2].map(|i: usize| {
-                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                u[j] * v[k] - u[k] * v[j]
-            });
-            let part = 0.5 * cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-            let at_corners = corners.map(|x| shape.signed_distance(x));
-            let at_middle = shape.signed_distance(middle);
-            // Exact for quadratic functions.
-            let square =
-                at_corners.map(|s| s * s).iter().sum::<f64>() / 12.0 + 0.75 * at_middle.powi(2);
-            largest = at_corners.iter().fold(largest, |all, s| all.max(s.abs()));
-            area += part;
-            squares += part * square;
-            let cosine: f64 = (0..3)
-                .map(|i| mesh.face_normal(*face)[i] * normal(shape, middle)[i])
-                .sum();
-            angles += part * cosine.clamp(-1.0, 1.0).acos().to_degrees();
-        }
+        let nearness = Nearness::of(mesh, shape);
+        let angles = mesh.faces.par_iter().map(|face| {
+            let middle = middle(mesh, *face);
+            let (a, b) = (mesh.face_normal(*face), normal(shape, middle));
+            let cosine: f64 = (0..3).map(|i| a[i] * b[i]).sum();
+            area(mesh, *face) * cosine.clamp(-1.0, 1.0).acos().to_degrees()
+        });
+        let angles: Vec<f64> = angles.collect();
         let voxels = self.voxels(number + 1);
         Numbers::from([
-            ("rms", (squares / area).sqrt()),
-            ("largest", largest),
-            ("normals", angles / area),
-            ("area", 100.0 * (area / self.areas[number] - 1.0)),
+            ("rms", nearness.rms()),
+            ("largest", nearness.largest),
+            ("normals", angles.iter().sum::<f64>() / nearness.area),
+            ("area", 100.0 * (nearness.area / self.areas[number] - 1.0)),
             ("volume", 100.0 * (mesh.volume() / voxels - 1.0)),
         ])
     }
@@ -349,6 +341,56 @@ impl Segmentation {
         let overlaps = owners.iter().filter(|count| **count > 1).count();
         [gaps, overlaps].map(percent)
     }
+}
+
+/// The distances of a surface to a shape.
+struct Nearness {
+    area: f64,
+    /// Integral of the squares.
+    squares: f64,
+    largest: f64,
+}
+
+impl Nearness {
+    fn of(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> Self {
+        let at = mesh.vertices.par_iter().map(|&x| shape.signed_distance(x));
+        let at: Vec<f64> = at.collect();
+        let faces = mesh.faces.par_iter().map(|&face| {
+            let corners = face
+                .map(|vertex| at[vertex as usize].powi(2))
+                .iter()
+                .sum::<f64>();
+            let middle = shape.signed_distance(middle(mesh, face)).powi(2);
+            // Exact for quadratic functions.
+            let area = area(mesh, face);
+            [area, area * (corners / 12.0 + 0.75 * middle)]
+        });
+        let faces: Vec<[f64; 2]> = faces.collect();
+        Self {
+            area: faces.iter().map(|face| face[0]).sum(),
+            squares: faces.iter().map(|face| face[1]).sum(),
+            largest: at.into_iter().map(f64::abs).fold(0.0, f64::max),
+        }
+    }
+
+    fn rms(&self) -> f64 {
+        (self.squares / self.area).sqrt()
+    }
+}
+
+fn middle(mesh: &TriangleMesh, face: [u32; 3]) -> [f64; 3] {
+    let corners = face.map(|vertex| mesh.vertices[vertex as usize]);
+    std::array::from_fn(|i| corners.iter().map(|x| x[i]).sum::<f64>() / 3.0)
+}
+
+fn area(mesh: &TriangleMesh, face: [u32; 3]) -> f64 {
+    let corners = face.map(|vertex| mesh.vertices[vertex as usize]);
+    let [u, v] = [1, 2].map(|k: usize| [0, 1, 2].map(|i| corners[k][i] - corners[0][i]));
+    let cross = [0, 1, 2].map(|i: usize| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        u[j] * v[k] - u[k] * v[j]
+    });
+    0.5 * cross.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 /// The direction in which the distance grows.

@@ -91,6 +91,8 @@ const TITLE: &str = "Segmentations without their steps";
 /// Rounds of Taubin's and of Laplacian smoothing as trimesh 4 has them by default, and the most that are tried.
 const USUAL_ROUNDS: usize = 10;
 const MOST_ROUNDS: usize = 60;
+/// So many more rounds without a smaller distance end the search for the best number.
+const PATIENCE: usize = 5;
 /// Of meshes of several labels one after the other.
 type Meshes = Vec<TriangleMesh>;
 
@@ -110,6 +112,10 @@ struct Options {
     /// Take these bodies alone
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     bodies: Vec<String>,
+
+    /// The radius below which details go by `fair`, in voxels [default: that of the program]
+    #[arg(long, value_name = "LENGTH")]
+    detail: Option<f64>,
 }
 
 /// What a method made of a segmentation.
@@ -149,7 +155,7 @@ fn program(options: &Options) -> Result<()> {
         .iter()
         .map(|(name, sizes)| (*name, sizes[full]))
         .collect();
-    let parameters = json!({ "bodies": names, "wrong": WRONG, "taubin": TAUBIN, "laplacian": LAPLACIAN, "rounds": [USUAL_ROUNDS, MOST_ROUNDS] });
+    let parameters = json!({ "bodies": names, "wrong": WRONG, "taubin": TAUBIN, "laplacian": LAPLACIAN, "rounds": [USUAL_ROUNDS, MOST_ROUNDS], "detail": options.detail });
     let mut session = Session::open(EXPERIMENT.name, &options.run, parameters)?;
     let seed = session.options.seed;
     let bodies = session.phase("shapes", |_| {
@@ -170,7 +176,7 @@ fn program(options: &Options) -> Result<()> {
     }
     let mut rows = Vec::new();
     for body in &bodies {
-        let treated = treated(&mut session, body, &others)?;
+        let treated = treated(&mut session, body, &others, options.detail)?;
         compare(&mut session, &treated)?;
         rows.extend(treated);
     }
@@ -198,6 +204,7 @@ fn treated<'a>(
     session: &mut Session,
     body: &'a Segmentation,
     others: &Others,
+    detail: Option<f64>,
 ) -> Result<Vec<Row<'a>>> {
     let row = |treatment: &str, parameters: &str, seconds: Option<f64>, meshes: Meshes| {
         Ok::<_, crate::Error>(Row {
@@ -238,66 +245,70 @@ fn treated<'a>(
                 usual,
             )?);
             let mut meshes: Vec<_> = marched.iter().map(|mesh| rounds(mesh, factors)).collect();
-            let mut best: Option<(usize, Row<'_>)> = None;
+            let mut best: Option<(f64, usize, Meshes)> = None;
             for count in 1..=MOST_ROUNDS {
-                let next = meshes.iter_mut().filter_map(Iterator::next).collect();
-                let next = row(
-                    &format!("{name}_tuned"),
-                    &format!("{count} rounds"),
-                    None,
-                    next,
-                )?;
-                if best
+                let next: Meshes = meshes.iter_mut().filter_map(Iterator::next).collect();
+                let distance = body.distance(&next);
+                if best.as_ref().is_none_or(|(least, _, _)| distance < *least) {
+                    best = Some((distance, count, next));
+                } else if best
                     .as_ref()
-                    .is_none_or(|(_, best)| next.numbers["rms"] < best.numbers["rms"])
+                    .is_some_and(|(_, at, _)| count > at + PATIENCE)
                 {
-                    best = Some((count, next));
-                } else if best.as_ref().is_some_and(|(at, _)| count > at + 10) {
                     break;
                 }
             }
-            rows.extend(best.map(|(_, row)| row));
+            if let Some((_, count, nearest)) = best {
+                let name = format!("{name}_tuned");
+                rows.push(row(&name, &format!("{count} rounds"), None, nearest)?);
+            }
         }
         Ok::<_, crate::Error>(())
     })?;
     session.phase(format!("{}: meshes of other programs", body.name), |_| {
         for name in ["surface_nets", "constrained"] {
-            let mut best: Option<Row<'_>> = None;
-            for run in others
-                .runs
-                .iter()
-                .filter(|run| run.body == body.name && run.method == name)
-            {
+            let mut best: Option<(f64, &OtherRun, Meshes)> = None;
+            let runs = others.runs.iter();
+            for run in runs.filter(|run| run.body == body.name && run.method == name) {
                 let meshes = others.meshes(run)?;
                 if run.parameters.is_empty() {
                     rows.push(row(name, "defaults", Some(run.seconds), meshes.clone())?);
                 }
-                let next = row(
-                    &format!("{name}_tuned"),
-                    &run.parameters,
-                    Some(run.seconds),
-                    meshes,
-                )?;
-                if best
-                    .as_ref()
-                    .is_none_or(|best| next.numbers["rms"] < best.numbers["rms"])
-                {
-                    best = Some(next);
+                let distance = body.distance(&meshes);
+                if best.as_ref().is_none_or(|(least, _, _)| distance < *least) {
+                    best = Some((distance, run, meshes));
                 }
             }
-            rows.extend(best);
+            if let Some((_, run, nearest)) = best {
+                let parameters = if run.parameters.is_empty() {
+                    "defaults"
+                } else {
+                    &run.parameters
+                };
+                rows.push(row(
+                    &format!("{name}_tuned"),
+                    parameters,
+                    Some(run.seconds),
+                    nearest,
+                )?);
+            }
         }
         Ok::<_, crate::Error>(())
     })?;
-    let (meshes, seconds) = session.phase(format!("{}: fair", body.name), |_| faired(body))?;
-    rows.push(row("fair", "defaults", Some(seconds), meshes)?);
+    let parameters = &detail.map_or("defaults".to_owned(), |detail| format!("detail {detail}"));
+    let (meshes, seconds) =
+        session.phase(format!("{}: fair", body.name), |_| faired(body, detail))?;
+    rows.push(row("fair", parameters, Some(seconds), meshes)?);
     Ok(rows)
 }
 
 /// What the program makes of it at its defaults.
-fn faired(body: &Segmentation) -> Result<(Meshes, f64)> {
+fn faired(body: &Segmentation, detail: Option<f64>) -> Result<(Meshes, f64)> {
     let clock = Instant::now();
-    let options = FairOptions::of(Input::volume(body.name, body.volume.clone()));
+    let options = FairOptions {
+        detail,
+        ..FairOptions::of(Input::volume(body.name, body.volume.clone()))
+    };
     let meshes = if body.shapes.len() > 1 {
         let made = jobs::shared_labels(options, &Silent)?;
         let surface = |label: usize| made.walls.of_label(label as u32);
