@@ -9,6 +9,7 @@ use engine::{Record, Run};
 use experiments::experiment::Experiment;
 use experiments::networks::{Chosen, PAPERS};
 use experiments::programs::EXPERIMENTS;
+use experiments::segmentations::BODIES;
 use experiments::timing;
 use model::Shipped;
 use operators::ComputeDevice;
@@ -563,14 +564,17 @@ fn the_quick_denoising_takes_off_noise_and_keeps_the_volume() {
 fn the_quick_segmentations_keep_their_volume() {
     let root = tempfile::tempdir().unwrap();
     let summary = quick_summary(UNSHRINKING, root.path());
-    for body in ["ball", "figure"] {
+    for (body, _) in BODIES {
         let metric = |name: &str| summary[&format!("unshrinking.{body}.{name}")];
-        assert!(metric("fair.volume").abs() < 1e-6, "{summary:?}");
-        assert!(
-            metric("fair.w_over_8pi") < metric("marched.w_over_8pi"),
-            "{summary:?}"
-        );
+        assert!(metric("fair.volume").abs() < 0.05, "{summary:?}");
+        let [fair, voxels] = ["fair.normals", "voxels.normals"].map(metric);
+        assert!(fair < voxels, "{summary:?}");
     }
+    let metric = |name: &str| summary[&format!("unshrinking.sectors.fair.{name}")];
+    assert_eq!(
+        [metric("gaps"), metric("overlaps")].map(f64::to_bits),
+        [0; 2]
+    );
 }
 
 #[test]

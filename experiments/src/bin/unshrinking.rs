@@ -1,4 +1,4 @@
-//! Segmentations without their steps, and their volumes.
+//! Segmentations without their steps, and their volumes, beside other methods.
 
 // Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {

@@ -32,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const METRICS: MetricTable = MetricTable {
     title: "Segmentations",
-    note: "Lengths are in cube roots of the volume of a voxel. Values of several labels are the worst, those of `rms` and `normals` the means.",
+    note: "Lengths are in cube roots of the volume of a voxel. Values of several labels are the worst, those of the distance `rms` and of `normals` the means.",
     words: &[
         (
             "BODY",
@@ -43,8 +43,8 @@ const METRICS: MetricTable = MetricTable {
             "TREATMENT",
             "`voxels`, the surface between them by marching tetrahedra; `taubin` and `laplacian`, ten rounds of smoothing of it; `surface_nets`, \
              vtkSurfaceNets3D; `constrained`, constrained smoothing of PyMCubes; `taubin_tuned`, `laplacian_tuned`, `surface_nets_tuned` and \
-             `constrained_tuned`, these with the parameters that come nearest to the shape; `fair`, the program at its defaults, with `shared` for \
-             several labels",
+             `constrained_tuned`, these with the parameters that come nearest to the shape; `fair`, the program at its defaults, with shared walls \
+             of several labels",
         ),
     ],
     rows: &[
