@@ -176,7 +176,7 @@ const SPACE: [(&str, &str); 8] = [
     ),
 ];
 
-const NUMBERS: [(&str, &str); 24] = [
+const NUMBERS: [(&str, &str); 25] = [
     (
         "/energy_terms/spontaneous_curvature",
         "Spontaneous curvature in the energy, in one over units of the input",
