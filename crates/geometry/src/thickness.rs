@@ -29,16 +29,16 @@ pub fn thickness<const D: usize>(
     largest
 }
 
-/// Whether a shape, or the gap before it, is thinner than `width` at a point of its boundary with this outward normal.
+/// Whether a shape with this signed distance, or the gap before it, is thinner than `width` at a point of its boundary with this outward normal.
 pub fn is_thin<const D: usize>(
-    shape: &(impl SignedDistance<D> + ?Sized),
+    distance: impl Fn([f64; D]) -> f64,
     x: [f64; D],
     normal: [f64; D],
     width: f64,
 ) -> bool {
-    let inside = thickness(|x| shape.signed_distance(x), x, normal, width);
+    let inside = thickness(&distance, x, normal, width);
     let outward = normal.map(|n| -n);
-    let gap = || thickness(|x| -shape.signed_distance(x), x, outward, width);
+    let gap = || thickness(|x| -distance(x), x, outward, width);
     inside < width || gap() < width
 }
 
@@ -50,7 +50,7 @@ pub fn thin_part<const D: usize>(
 ) -> f64 {
     let (mut thin, mut all) = (0.0, 0.0);
     for (x, normal, weight) in points {
-        if is_thin(shape, x, normal, width) {
+        if is_thin(|x| shape.signed_distance(x), x, normal, width) {
             thin += weight;
         }
         all += weight;

@@ -285,7 +285,7 @@ fn before_and_after(
     };
     let pictures = ends.iter().map(|(label, mesh)| {
         let others = ends.iter().flat_map(|(_, other)| corners(other));
-        // The view to turn is what people look at; `final.png` is the picture for figures.
+        // The view to turn is what people look at.
         let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);
         let scene = scene.view(view).beside(others);
         let picture = scene.render([PIXELS; 2])?.to_png()?;

@@ -1,7 +1,7 @@
 //! Surfaces in space.
 
 use geometry::measure::bounding_box;
-use render::View;
+use render::{Quality, View};
 
 use crate::faired::{Faired, surface};
 use crate::made::{Shape, Surface, encoded};
@@ -56,7 +56,8 @@ impl Presentation<3> for Space {
         let mut scene = Scene::new(u, eps)?.view(View::from_front_left(self.up));
         if self.hardly_moves() {
             let start = surfaces::phase_field_surface(start, eps)?;
-            return Ok(scene.beside(start.vertices).render([PIXELS; 2])?);
+            let scene = scene.beside(start.vertices).quality(Quality::Draft);
+            return Ok(scene.render([PIXELS; 2])?);
         }
         // Room to grow, and more only for what grows beyond it, so that the pictures of a film do not jump.
         let start = bounding_box(start).map(|b| b.grown([ROOM * b.longest_side(); 3]));

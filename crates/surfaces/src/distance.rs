@@ -1,9 +1,10 @@
 //! The exact signed distance to a closed mesh.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use geometry::{Bricks, Field, Grid, Nodes, PhaseField, SignedDistance, Stored};
+use geometry::{Bricks, Field, Grid, Nodes, PhaseField, SignedDistance, Stored, is_thin};
 use rayon::prelude::*;
 
 use crate::hierarchy::{Hierarchy, Nearest};
@@ -240,6 +241,18 @@ impl MeshDistance {
     pub fn signed_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let points = points.par_iter();
         points.map(|&x| self.signed_distance(x)).collect()
+    }
+
+    /// Whether the body, or the gap before it, is thinner than `width` at a point of the mesh with this outward normal. The face nearest to one place
+    /// bounds the search for the next one's.
+    pub(crate) fn is_thin(&self, x: [f64; 3], normal: [f64; 3], width: f64) -> bool {
+        let near = Cell::new(None);
+        let distance = |x: [f64; 3]| {
+            let (distance, nearest) = self.distance_near(Vector::from_array(x), near.get());
+            near.set(nearest);
+            distance
+        };
+        is_thin(distance, x, normal, width)
     }
 
     /// The signed distance of `x`, and the nearest face; NaN if there is none. A face that is not

@@ -1,10 +1,10 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
-use geometry::{PhaseField, Placement, distances_from_phase_field, is_thin};
+use geometry::{PhaseField, Placement, distances_from_phase_field};
 use rayon::prelude::*;
 
 use crate::level_set::project;
-use crate::smoothing::TAUBIN;
+use crate::smoothing::{TAUBIN, Umbrellas};
 use crate::vector::Vector;
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
 
@@ -167,7 +167,7 @@ impl Fairing {
         let mut lost: Vec<bool> = (followed.levels.iter().map(|level| level.abs() > far)).collect();
         let thin = mesh.faces.par_iter().filter(|&&face| {
             let centre = mesh.corners(face).into_iter().sum::<Vector>() / 3.0;
-            is_thin(&distance, centre.to_array(), mesh.face_normal(face), width)
+            distance.is_thin(centre.to_array(), mesh.face_normal(face), width)
         });
         for vertex in thin.collect::<Vec<_>>().into_iter().flatten() {
             lost[*vertex as usize] = true;
@@ -243,15 +243,20 @@ fn without_short_waves(
     surface: usize,
 ) -> ClosedMesh {
     let mut smooth = rough.clone();
+    // Rounds move vertices and leave their neighbours.
+    let umbrellas = Umbrellas::of(rough.mesh());
     for _ in 0..ROUNDS {
-        let mut next = smooth.mesh().smoothed(1, TAUBIN[0], TAUBIN[1]);
+        let mut next = smooth.mesh().smoothed_by(&umbrellas, 1, TAUBIN);
         hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
         hold(&mut next, rough.mesh(), kept);
         let moved = along_normals(&next, rough.mesh(), &next);
         let moved = root_mean_square(&moved[..surface]);
+        if moved.is_nan() || moved > SMOOTHED * noise {
+            break;
+        }
         match ClosedMesh::new(next) {
-            Ok((next, _)) if moved <= SMOOTHED * noise => smooth = next,
-            // Also where slivers lose their area.
+            Ok((next, _)) if next.mesh().faces.len() == rough.mesh().faces.len() => smooth = next,
+            // Where slivers lose their area.
             _ => break,
         }
     }

@@ -1,5 +1,9 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
+use std::ops::{Add, Div, Mul, Sub};
+
+use geometry::parallel;
+
 use crate::vector::Vector;
 use crate::{Parts, TriangleMesh};
 
@@ -13,45 +17,98 @@ pub const TAUBIN: [f64; 2] = [0.5, -0.53];
 /// Those of fields on a mesh.
 const FACTORS: [f64; 2] = [0.5, -0.47];
 
+/// Vertices are worked on in pieces of this many.
+const CHUNK: usize = 1 << 12;
+
 /// The neighbours of every vertex along edges, in ascending order.
-struct Umbrellas(Vec<Vec<u32>>);
+pub(crate) struct Umbrellas {
+    /// Where those of each vertex begin, and the end of all.
+    starts: Vec<usize>,
+    neighbours: Vec<u32>,
+}
+
+/// What is smoothed on a mesh.
+pub(crate) trait Smoothed:
+    Copy
+    + Default
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<f64, Output = Self>
+{
+}
+
+impl Smoothed for f64 {}
+impl Smoothed for Vector {}
 
 impl Umbrellas {
-    fn of(mesh: &TriangleMesh) -> Self {
-        let mut neighbours = vec![Vec::new(); mesh.vertices.len()];
-        for &[a, b, c] in &mesh.faces {
-            neighbours[a as usize].extend([b, c]);
-            neighbours[b as usize].extend([c, a]);
-            neighbours[c as usize].extend([a, b]);
+    pub(crate) fn of(mesh: &TriangleMesh) -> Self {
+        let sides = |[a, b, c]: [u32; 3]| [(a, b), (a, c), (b, c), (b, a), (c, a), (c, b)];
+        let mut ends = vec![0; mesh.vertices.len()];
+        let all = || mesh.faces.iter().copied().flat_map(sides);
+        all().for_each(|(vertex, _)| ends[vertex as usize] += 1);
+        let mut end = 0;
+        for count in &mut ends {
+            // Its neighbours are written from here on.
+            end += std::mem::replace(count, end);
         }
-        for around in &mut neighbours {
-            around.sort_unstable();
-            around.dedup();
+        let mut neighbours = vec![0; end];
+        for (vertex, near) in all() {
+            let place = &mut ends[vertex as usize];
+            neighbours[*place] = near;
+            *place += 1;
         }
-        Self(neighbours)
+        let (mut starts, mut first, mut kept) = (vec![0], 0, 0);
+        for end in ends {
+            neighbours[first..end].sort_unstable();
+            for place in first..end {
+                // Two faces share an edge.
+                if place == first || neighbours[place] != neighbours[place - 1] {
+                    neighbours[kept] = neighbours[place];
+                    kept += 1;
+                }
+            }
+            starts.push(kept);
+            first = end;
+        }
+        neighbours.truncate(kept);
+        Self { starts, neighbours }
     }
 
-    /// `L x = x - (mean of the neighbours)`; zero where there are none.
+    /// The neighbours of a vertex.
+    fn around(&self, vertex: usize) -> &[u32] {
+        &self.neighbours[self.starts[vertex]..self.starts[vertex + 1]]
+    }
+
+    /// `L x = x - (mean of the neighbours)` at a vertex; zero where there are none.
+    fn laplacian_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
+        let around = self.around(vertex);
+        if around.is_empty() {
+            return T::default();
+        }
+        let near = around.iter().map(|&n| x[n as usize]);
+        x[vertex] - near.fold(T::default(), T::add) / around.len() as f64
+    }
+
     fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
-        let at = |vertex: usize| {
-            let around = &self.0[vertex];
-            if around.is_empty() {
-                return Vector::ZERO;
-            }
-            let sum: Vector = around.iter().map(|&n| x[n as usize]).sum();
-            x[vertex] - sum / around.len() as f64
-        };
-        (0..x.len()).map(at).collect()
+        parallel::table(x.len(), CHUNK, Vector::ZERO, &|vertex| {
+            self.laplacian_at(x, vertex)
+        })
     }
 
     /// Taubin's smoothing of a field on the vertices.
-    fn smooth(&self, x: &mut [Vector], iterations: usize, factors: [f64; 2]) {
+    pub(crate) fn smooth<T: Smoothed>(&self, x: &mut Vec<T>, iterations: usize, factors: [f64; 2]) {
+        let mut next = x.clone();
         for factor in std::iter::repeat_n(factors, iterations).flatten() {
             if factor != 0.0 {
-                let steps = self.laplacian(x);
-                for (x, step) in x.iter_mut().zip(steps) {
-                    *x -= factor * step;
-                }
+                parallel::over_chunks(&mut next, CHUNK, &|first, part| {
+                    for (next, vertex) in part.iter_mut().zip(first..) {
+                        *next = x[vertex] - self.laplacian_at(x, vertex) * factor;
+                    }
+                });
+                std::mem::swap(x, &mut next);
             }
         }
     }
@@ -60,11 +117,11 @@ impl Umbrellas {
     fn squared_weights(&self, vertex: usize, weights: &mut Vec<(u32, f64)>) -> f64 {
         weights.clear();
         weights.push((vertex as u32, 1.0));
-        let around = &self.0[vertex];
+        let around = self.around(vertex);
         let share = 1.0 / around.len() as f64;
         for &near in around {
             weights.push((near, -2.0 * share));
-            let next = &self.0[near as usize];
+            let next = self.around(near as usize);
             let part = share / next.len() as f64;
             weights.extend(next.iter().map(|&far| (far, part)));
         }
@@ -82,8 +139,18 @@ impl TriangleMesh {
     ///
     /// With `mu = 0` it is Laplacian smoothing. G. Taubin: A signal processing approach to fair surface design. SIGGRAPH (1995).
     pub fn smoothed(&self, iterations: usize, lambda: f64, mu: f64) -> Self {
+        self.smoothed_by(&Umbrellas::of(self), iterations, [lambda, mu])
+    }
+
+    /// The same, where the neighbours of its vertices are known.
+    pub(crate) fn smoothed_by(
+        &self,
+        umbrellas: &Umbrellas,
+        iterations: usize,
+        factors: [f64; 2],
+    ) -> Self {
         let mut x = self.points();
-        Umbrellas::of(self).smooth(&mut x, iterations, [lambda, mu]);
+        umbrellas.smooth(&mut x, iterations, factors);
         self.on(&x)
     }
 
@@ -113,9 +180,9 @@ impl TriangleMesh {
     /// standard deviation.
     pub(crate) fn averaged(&self, numbers: &[f64]) -> Vec<f64> {
         const ROUNDS: usize = 8;
-        let mut x: Vec<Vector> = numbers.iter().map(|&x| Vector::new(x, 0.0, 0.0)).collect();
+        let mut x = numbers.to_vec();
         Umbrellas::of(self).smooth(&mut x, ROUNDS, FACTORS);
-        x.into_iter().map(|x| x.x).collect()
+        x
     }
 
     /// All vertices that may move moved along their normals by the same length, so that the closed surface encloses `volume`.
@@ -220,16 +287,13 @@ impl TriangleMesh {
     pub(crate) fn noise_of_first(&self, count: usize) -> f64 {
         let umbrellas = Umbrellas::of(self);
         // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
-        let normals = self.smoothed(12, TAUBIN[0], TAUBIN[1]).vertex_normals();
+        let normals = self.smoothed_by(&umbrellas, 12, TAUBIN).vertex_normals();
         let found = self.squared_noise(&umbrellas, &normals);
-        // A number at each vertex, as a vector.
-        let mut squares: Vec<Vector> = (found.iter())
-            .map(|square| Vector::new(square.unwrap_or(0.0), 0.0, 0.0))
-            .collect();
+        let mut squares: Vec<f64> = found.iter().map(|square| square.unwrap_or(0.0)).collect();
         umbrellas.smooth(&mut squares, AVERAGING, [0.5, 0.0]);
         let means = squares.iter().zip(&found).take(count);
         let means = means.filter(|(_, at)| at.is_some());
-        let mut means: Vec<f64> = means.map(|(mean, _)| mean.x).collect();
+        let mut means: Vec<f64> = means.map(|(mean, _)| *mean).collect();
         if means.is_empty() {
             return 0.0;
         }
@@ -251,7 +315,7 @@ impl TriangleMesh {
         /// The median of the square of a normal number.
         const MEDIAN: f64 = 0.455;
         let umbrellas = Umbrellas::of(self);
-        let normals = self.smoothed(12, TAUBIN[0], TAUBIN[1]).vertex_normals();
+        let normals = self.smoothed_by(&umbrellas, 12, TAUBIN).vertex_normals();
         let median = |mut values: Vec<f64>| -> f64 {
             if values.is_empty() {
                 return 0.0;
@@ -261,12 +325,11 @@ impl TriangleMesh {
         };
         let of_order = |order: usize| {
             let squares = self.squared_order(&umbrellas, &normals, order);
-            let mut means: Vec<Vector> =
-                squares.iter().map(|&s| Vector::new(s, 0.0, 0.0)).collect();
+            let mut means = squares.clone();
             umbrellas.smooth(&mut means, AVERAGING, [0.5, 0.0]);
             let of_surface = squares.len().min(count);
-            let means = means[..of_surface].iter().map(|mean| mean.x).collect();
-            (median(squares[..of_surface].to_vec()), median(means))
+            let of_first = |values: &[f64]| median(values[..of_surface].to_vec());
+            (of_first(&squares), of_first(&means))
         };
         let ((single, once), (_, twice)) = (of_order(1), of_order(2));
         (twice / once).sqrt() >= ROUGH && (single / (MEDIAN * once)).sqrt() >= EVERYWHERE
@@ -285,7 +348,7 @@ impl TriangleMesh {
         let at = |(vertex, way): (usize, &Vector)| {
             let along = way.dot(Vector::from_array(normals[vertex]));
             // One, and as many equal parts of one as there are neighbours.
-            let weights = 1.0 + 1.0 / umbrellas.0[vertex].len().max(1) as f64;
+            let weights = 1.0 + 1.0 / umbrellas.around(vertex).len().max(1) as f64;
             along * along / weights
         };
         once.iter().enumerate().map(at).collect()
@@ -312,7 +375,7 @@ impl TriangleMesh {
             let along = twice[v].dot(Vector::from_array(normals[v]));
             along * along / umbrellas.squared_weights(v, &mut weights)
         };
-        let inner = umbrellas.0.iter().map(|near| near.len() > 2);
+        let inner = (0..normals.len()).map(|v| umbrellas.around(v).len() > 2);
         (inner.enumerate().map(|(v, inner)| inner.then(|| at(v)))).collect()
     }
 }
