@@ -221,11 +221,23 @@ def test_repair(open_mesh):
 
 def test_fair_with_repair(open_mesh):
     with pytest.raises(willmore.Error, match="open"):
-        willmore.fair(open_mesh, cells=24, steps=1)
+        willmore.flow(open_mesh, cells=24, steps=1)
     with pytest.warns(willmore.WillmoreWarning, match="closes holes") as told:
         result = willmore.fair(open_mesh, repair=True, cells=24, steps=1)
     assert told[0].filename == __file__ and result.warnings
     assert trimesh.Trimesh(*result.mesh).is_watertight
+
+
+def test_the_boundary_of_an_open_mesh_stays(noisy):
+    vertices, faces = noisy
+    top = vertices[faces].mean(axis=1)[:, 2]
+    kept = faces[top < np.quantile(top, 0.9)]
+    with pytest.warns(willmore.WillmoreWarning, match="closed by smooth lids"):
+        faired = willmore.fair((vertices, kept), **OPTIONS).mesh
+    edges = trimesh.Trimesh(vertices, kept, process=False).edges_sorted
+    rim = np.unique(edges[trimesh.grouping.group_rows(edges, require_count=1)])
+    assert np.array_equal(faired.vertices[rim], vertices[rim])
+    assert np.array_equal(faired.faces, kept) and not np.array_equal(faired.vertices, vertices)
 
 
 def test_warnings_point_at_the_caller(sphere):

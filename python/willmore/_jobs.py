@@ -42,7 +42,8 @@ def fair(
     Parameters
     ----------
     mesh
-        ``(vertices, faces)``, a mesh of trimesh, pyvista or meshio, or the name of a file. It must be closed, or see `repair`.
+        ``(vertices, faces)``, a mesh of trimesh, pyvista or meshio, or the name of a file. The boundary of one
+        that is open does not move.
     noise : float, optional
         Standard deviation of the noise along the normals, in the units of the mesh. By default it is estimated.
     max_distance : float, optional

@@ -56,6 +56,8 @@ pub struct StepControl {
 struct Attempt {
     size: f64,
     halvings: u32,
+    /// Of these attempts, those whose minimization failed in a step that holds sizes.
+    failures: u32,
     refused_hvp: f64,
 }
 
@@ -168,6 +170,7 @@ impl StepControl {
         Attempt {
             size,
             halvings,
+            failures: 0,
             refused_hvp: 0.0,
         }
     }
@@ -218,7 +221,19 @@ impl StepControl {
             let halvings = attempt.halvings;
             return Verdict::GiveUp { halvings };
         }
-        self.try_again(attempt, 0.5 * attempt.size, 0.0)
+        // What fails again and again is far too long.
+        let more = if self.holds && self.substeps.is_none() {
+            (attempt.failures).min(most - attempt.halvings - 1)
+        } else {
+            0
+        };
+        let size = attempt.size * 0.5_f64.powi(1 + more as i32);
+        let failures = attempt.failures + 1;
+        let verdict = self.try_again(attempt, size, 0.0);
+        if let Some(next) = &mut self.attempt {
+            (next.halvings, next.failures) = (next.halvings + more, failures);
+        }
+        verdict
     }
 
     /// Another attempt of this size, after one that took so many Hessian-vector products.
@@ -226,6 +241,7 @@ impl StepControl {
         self.attempt = Some(Attempt {
             size,
             halvings: attempt.halvings + 1,
+            failures: attempt.failures,
             refused_hvp: attempt.refused_hvp + hvp,
         });
         Verdict::Retry

@@ -75,7 +75,8 @@ pub struct InputOptions {
 
     /// Repair a mesh that is open, crosses itself, or has triangles of inconsistent orientation
     ///
-    /// The repair makes a new mesh, and the program reports the changes.
+    /// Bodies that are apart stay apart. Smooth lids close holes, and all else stays. Parts that cross themselves or each other are made anew, on as many
+    /// cells along the mesh as `cells` says. The program reports the changes.
     #[arg(long, help_heading = INPUT, hide_short_help = true)]
     pub repair: bool,
 

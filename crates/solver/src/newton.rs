@@ -76,6 +76,30 @@ struct Point<const D: usize> {
     tangent: Option<Tangent<D>>,
 }
 
+/// The smallest estimate so far, and how many Newton steps ago it was half as small as before.
+#[derive(Default)]
+struct Progress {
+    smallest: Option<f64>,
+    since: usize,
+}
+
+impl Progress {
+    /// Whether for a while no estimate has been half of the smallest one.
+    fn has_stalled(&mut self, estimate: f64) -> bool {
+        /// Newton steps; those that converge take fewer for a digit.
+        const PATIENCE: usize = 10;
+        if self
+            .smallest
+            .is_none_or(|smallest| estimate <= 0.5 * smallest)
+        {
+            (self.smallest, self.since) = (Some(estimate), 0);
+        } else {
+            self.since += 1;
+        }
+        self.since >= PATIENCE
+    }
+}
+
 /// Why a minimization ended, and where: the phase field and its energy.
 type End<const D: usize> = (Exit, (Tensor<D>, f64));
 
@@ -383,6 +407,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     /// Newton's method with the preconditioner, from the better of `start` and the previous phase field.
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
         let mut point = self.better_start(start)?;
+        let mut progress = Progress::default();
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;
             let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
@@ -403,6 +428,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             self.info.newton += 1;
             if let Some(exit) = done.or(lost.then_some(Exit::Precision)) {
                 return Ok((exit, self.last_step(point, &solution, lost)?));
+            }
+            // Sizes that a step of this length cannot hold: a shorter one is tried instead.
+            if self.held.is_some() && progress.has_stalled(self.info.estimate) {
+                break;
             }
             point = match self.along_the_profile(&point, &solution)? {
                 Some(next) => next,
