@@ -72,7 +72,7 @@ unsafe impl GlobalAlloc for OrRefuse {
 pub fn keep_freed() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
-        const KEPT: libc::c_int = 128 << 20;
+        const KEPT: libc::c_int = libc::c_int::MAX;
         #[allow(unsafe_code, reason = "a call into the C library without pointers")]
         // SAFETY: `mallopt` takes two integers; this is called before there are other threads.
         unsafe {

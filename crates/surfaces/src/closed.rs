@@ -22,6 +22,9 @@ pub struct ClosedMesh {
     components: usize,
 }
 
+/// The sum of the volumes behind faces is exact to this part of the product of their area and the longest side.
+const ROUNDING: f64 = 1e-14;
+
 /// What [`ClosedMesh::new`] changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
 #[non_exhaustive]
@@ -109,8 +112,7 @@ impl ClosedMesh {
 
         let bounds = mesh.bounding_box().ok_or(Error::NoFaces)?;
         let (area, volume) = (area(&mesh), mesh.volume());
-        // The sum of the volumes is exact to a few units in the last place of this product.
-        let rounding = 1e-14 * area * bounds.longest_side();
+        let rounding = ROUNDING * area * bounds.longest_side();
         if volume.abs() <= rounding {
             return Err(Error::NoVolume { volume, area });
         }
@@ -126,6 +128,28 @@ impl ClosedMesh {
             mesh,
         };
         Ok((closed, warnings))
+    }
+
+    /// The surface with these positions of its vertices in place of its own. What depends on its faces alone is not looked at again.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn moved(&self, mesh: TriangleMesh) -> Result<Self, Error> {
+        // Vertices of seams may come apart, and parts into each other.
+        let no_seams = self.euler_characteristic + mesh.faces.len() as i64 / 2;
+        let is_one = self.components == 1 && mesh.vertices.len() as i64 == no_seams;
+        let is_good = || {
+            let side = mesh
+                .bounding_box()
+                .map_or(0.0, |bounds| bounds.longest_side());
+            mesh.check(f64::MAX).is_ok()
+                && has_no_area(&mesh).is_ok()
+                && mesh.volume() > ROUNDING * area(&mesh) * side
+        };
+        if is_one && is_good() {
+            return Ok(Self { mesh, ..*self });
+        }
+        Self::new(mesh).map(|(moved, _)| moved)
     }
 
     /// The triangles.

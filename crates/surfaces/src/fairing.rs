@@ -254,8 +254,8 @@ fn without_short_waves(
         if moved.is_nan() || moved > SMOOTHED * noise {
             break;
         }
-        match ClosedMesh::new(next) {
-            Ok((next, _)) if next.mesh().faces.len() == rough.mesh().faces.len() => smooth = next,
+        match smooth.moved(next) {
+            Ok(next) if next.mesh().faces.len() == rough.mesh().faces.len() => smooth = next,
             // Where slivers lose their area.
             _ => break,
         }
