@@ -150,7 +150,7 @@ def surfaces(
     spacing, origin : float or three of them, optional
         Sides of a voxel and the centre of the first one, in place of `affine`; by default 1 and 0.
     detail : float, optional
-        Details with a smaller radius are smoothed away. By default it is two voxels.
+        Details with a smaller radius are smoothed away. By default it is 1.25 voxels.
     max_distance : float, optional
         Largest distance of the vertices from the surface between the voxels. By default it is half a voxel. It wins over `detail`.
     volume : "keep", float, "90%" or None

@@ -114,7 +114,7 @@ def shared_surfaces(
     spacing, origin : float or three of them, optional
         Sides of a voxel and the centre of the first one, in place of `affine`; by default 1 and 0.
     detail : float, optional
-        Details with a smaller radius are smoothed away. By default it is two voxels.
+        Details with a smaller radius are smoothed away. By default it is 1.25 voxels.
     max_distance : float, optional
         Largest distance of the vertices from the surfaces between the voxels. By default it is half a voxel. It wins over `detail`.
     cells : int, optional

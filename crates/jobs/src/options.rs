@@ -432,7 +432,7 @@ pub struct FairOptions {
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
 
-    /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: two voxels]
+    /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: 1.25 voxels]
     ///
     /// The flow stops at the time (0.8 LENGTH)^4. A bump with the radius LENGTH / 2 keeps 12 % of its height, one with the radius LENGTH 37 %, and
     /// one with the radius 2 LENGTH 79 %. With the default, the flow also stops when the surface has moved by 0.35 of a voxel. If `time`, `energy`,

@@ -12,7 +12,7 @@ const FILE: &str = "voxels.ply";
 /// Parts smaller than balls of this radius, in interface widths, stay as they are where parts keep their volumes: a phase field does not hold them.
 const SMALL: f64 = 1.5;
 /// The usual radius below which details go, in voxels.
-pub const DETAIL: f64 = 2.0;
+pub const DETAIL: f64 = 1.25;
 /// How far vertices usually may be from the surface between the voxels, in voxels.
 pub const MAX_DISTANCE: f64 = 0.5;
 /// Waves that are longer than some five times so many of these radii are those of the voxels.
