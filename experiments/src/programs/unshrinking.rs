@@ -379,7 +379,7 @@ impl Others {
             status.success(),
             "scripts/other_smoothings failed, as it says",
         )?;
-        let told = files::read(&folder.path().join("others.json"))?;
+        let told = files::read(folder.path().join("others.json"))?;
         Ok(Self {
             folder: Some(folder),
             ..serde_json::from_slice(&told)?
