@@ -90,7 +90,9 @@ impl OpenSurface {
             let before = near.clone();
             for face in &mesh.faces[..self.faces] {
                 if face.iter().any(|&v| before[v as usize]) {
-                    face.iter().for_each(|&v| near[v as usize] = true);
+                    for &vertex in face {
+                        near[vertex as usize] = true;
+                    }
                 }
             }
         }
@@ -348,10 +350,9 @@ impl OwnMesh {
         if let Some(open) = open {
             // The boundary has its noise, which the surface beside it follows.
             let mut rings = open.rings(rough.mesh(), RINGS);
-            rings
-                .iter_mut()
-                .zip(&fairing.kept)
-                .for_each(|(free, kept)| *free &= !kept);
+            for (free, kept) in rings.iter_mut().zip(&fairing.kept) {
+                *free &= !kept;
+            }
             let normals = moved.vertex_normals();
             let faired = moved.vertices.clone();
             moved.bend_least(&rings);

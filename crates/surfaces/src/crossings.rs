@@ -47,7 +47,6 @@ impl TriangleMesh {
 impl TriangleMesh {
     /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
     /// there: in the end at their old places. So no face crosses others that did not before.
-    #[must_use]
     pub fn untangled(mut self, before: &Self) -> Self {
         /// Rounds in which such vertices go half of their way back, before they and more and more of their neighbours go all of it.
         const HALVINGS: usize = 4;
@@ -59,7 +58,7 @@ impl TriangleMesh {
             let tangled = (self.faces.iter().zip(&crosses).zip(&crossed))
                 .filter(|((_, now), before)| **now && !**before);
             for ((face, _), _) in tangled {
-                face.iter().for_each(|&v| goes_back[v as usize] = true);
+                mark(&mut goes_back, face);
             }
             if !goes_back.contains(&true) {
                 return self;
@@ -71,7 +70,7 @@ impl TriangleMesh {
                     .iter()
                     .filter(|f| f.iter().any(|&v| near[v as usize]))
                 {
-                    face.iter().for_each(|&v| goes_back[v as usize] = true);
+                    mark(&mut goes_back, face);
                 }
             }
             let part = if round < HALVINGS { 0.5 } else { 0.0 };
@@ -149,6 +148,12 @@ pub(crate) fn touching(mesh: &TriangleMesh, patch: &[usize]) -> Vec<[usize; 2]> 
         found
     });
     pairs.collect::<Vec<_>>().concat()
+}
+
+fn mark(marks: &mut [bool], face: &[u32; 3]) {
+    for &vertex in face {
+        marks[vertex as usize] = true;
+    }
 }
 
 /// Boxes around all faces, around halves of them, and so on.

@@ -40,7 +40,9 @@ impl TriangleMesh {
         let mut rim = vec![false; self.vertices.len()];
         let mut free = vec![false; self.vertices.len()];
         for rounded in &loops {
-            rounded.iter().for_each(|&v| rim[v as usize] = true);
+            for &vertex in rounded {
+                rim[vertex as usize] = true;
+            }
             add_lid(&mut mesh, rounded);
         }
         free.resize(mesh.vertices.len(), true);
@@ -136,7 +138,7 @@ fn simple(around: &[u32]) -> Vec<Vec<u32>> {
     for &vertex in around {
         if let Some(&first) = place.get(&vertex) {
             let rim = open.split_off(first);
-            rim.iter().for_each(|v| _ = place.remove(v));
+            place.retain(|_, at| *at < first);
             rims.push(rim);
         }
         place.insert(vertex, open.len());
@@ -217,7 +219,9 @@ impl Bending {
         let mut counts = free.to_vec();
         for face in &mesh.faces {
             if face.iter().any(|&v| free[v as usize]) {
-                face.iter().for_each(|&v| counts[v as usize] = true);
+                for &vertex in face {
+                    counts[vertex as usize] = true;
+                }
             }
         }
         let mut weights: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
@@ -250,7 +254,9 @@ impl Bending {
             let mut row: Vec<(usize, f64)> = weights[vertex].clone();
             let sum: f64 = row.iter().map(|(_, weight)| weight).sum();
             row.push((vertex, -sum));
-            row.iter_mut().for_each(|(_, weight)| *weight *= scale);
+            for (_, weight) in &mut row {
+                *weight *= scale;
+            }
             row
         });
         Self {

@@ -263,10 +263,10 @@ fn without_inner_bodies(mesh: &mut TriangleMesh) -> Result<usize, Error> {
         let is_inner = depths[number] % 2 == 1;
         number += 1;
         let is_inwards = (mesh.volume_behind(&*faces) < 0.0) != all_inwards;
-        if is_inwards != is_inner || all_inwards {
-            let turns = all_inwards || is_inwards;
-            if turns {
-                faces.iter_mut().for_each(|face| face.swap(1, 2));
+        // What is inwards with nothing around it is turned, and so is all of what is inside out.
+        if all_inwards || (is_inwards && !is_inner) {
+            for face in &mut *faces {
+                face.swap(1, 2);
             }
         }
         !is_inner || is_inwards
