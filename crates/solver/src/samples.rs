@@ -229,7 +229,11 @@ impl<const D: usize> Lattice<'_, D> {
             }
             samples
         });
-        chunks.into_iter().flatten().collect()
+        let mut samples = Vec::with_capacity(chunks.iter().map(Vec::len).sum());
+        for mut chunk in chunks {
+            samples.append(&mut chunk);
+        }
+        samples
     }
 
     /// Whether a node with this value belongs to the interface.
