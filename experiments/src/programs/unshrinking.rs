@@ -73,10 +73,6 @@ const METRICS: MetricTable = MetricTable {
             "volume inside of all labels together that belongs to none, and to several, in percent",
         ),
         (
-            "unshrinking.BODY.TREATMENT.seconds",
-            "wall time, without reading and writing",
-        ),
-        (
             "unshrinking.BODY.over_defaults, unshrinking.BODY.over_tuned",
             "`rms` of `fair` over the least of the others at their defaults, and tuned",
         ),
