@@ -84,6 +84,8 @@ const METRICS: MetricTable = MetricTable {
 };
 
 const TITLE: &str = "Segmentations without their steps";
+/// Cells per unit length in quick runs, where noise would ask for the finest grid.
+const QUICK_CELLS: usize = 32;
 /// Rounds of Taubin's and of Laplacian smoothing as trimesh 4 has them by default, and the most that are tried.
 const USUAL_ROUNDS: usize = 10;
 const MOST_ROUNDS: usize = 60;
@@ -172,7 +174,7 @@ fn program(options: &Options) -> Result<()> {
     }
     let mut rows = Vec::new();
     for body in &bodies {
-        let treated = treated(&mut session, body, &others, options.detail)?;
+        let treated = treated(&mut session, body, &others, options)?;
         compare(&mut session, &treated)?;
         rows.extend(treated);
     }
@@ -200,7 +202,7 @@ fn treated<'a>(
     session: &mut Session,
     body: &'a Segmentation,
     others: &Others,
-    detail: Option<f64>,
+    options: &Options,
 ) -> Result<Vec<Row<'a>>> {
     let row = |treatment: &str, parameters: &str, seconds: Option<f64>, meshes: Meshes| {
         Ok::<_, crate::Error>(Row {
@@ -291,20 +293,22 @@ fn treated<'a>(
         }
         Ok::<_, crate::Error>(())
     })?;
-    let parameters = &detail.map_or("defaults".to_owned(), |detail| format!("detail {detail}"));
+    let parameters = &options
+        .detail
+        .map_or("defaults".to_owned(), |detail| format!("detail {detail}"));
     let (meshes, seconds) =
-        session.phase(format!("{}: fair", body.name), |_| faired(body, detail))?;
+        session.phase(format!("{}: fair", body.name), |_| faired(body, options))?;
     rows.push(row("fair", parameters, Some(seconds), meshes)?);
     Ok(rows)
 }
 
 /// What the program makes of it at its defaults.
-fn faired(body: &Segmentation, detail: Option<f64>) -> Result<(Meshes, f64)> {
+fn faired(body: &Segmentation, options: &Options) -> Result<(Meshes, f64)> {
     let clock = Instant::now();
-    let options = FairOptions {
-        detail,
-        ..FairOptions::of(Input::volume(body.name, body.volume.clone()))
-    };
+    let (detail, quick) = (options.detail, options.run.quick);
+    let mut options = FairOptions::of(Input::volume(body.name, body.volume.clone()));
+    options.detail = detail;
+    options.input.cells = quick.then_some(QUICK_CELLS);
     let meshes = if body.shapes.len() > 1 {
         let made = jobs::shared_labels(options, &Silent)?;
         let surface = |label: usize| made.walls.of_label(label as u32);
