@@ -154,7 +154,8 @@ impl FairOptions {
                 return Err(Refusal::NoNoise.into());
             }
             let longest_side = own.rough().bounding_box().longest_side();
-            if noise > LITTLE * longest_side && !own.shows_noise() {
+            // What is left of noise by a repair is in longer waves, as a shape is.
+            if !repairs && noise > LITTLE * longest_side && !own.shows_noise() {
                 return Err(Refusal::NoiseOfShape {
                     percent: 100.0 * noise / longest_side,
                 }

@@ -10,6 +10,7 @@ use pages::{
     ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames, markdown,
     thinned, viewer,
 };
+use rayon::prelude::*;
 use render::Quality;
 use report::{Axis, LineChart, Marker, Series};
 
@@ -283,7 +284,7 @@ fn before_and_after(
         [first, .., last] => vec![first, last],
         [] => vec![],
     };
-    let pictures = ends.iter().map(|(label, mesh)| {
+    let pictures = ends.par_iter().map(|(label, mesh)| {
         let others = ends.iter().flat_map(|(_, other)| corners(other));
         // The view to turn is what people look at.
         let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);

@@ -79,7 +79,7 @@ pub struct Known<const D: usize> {
 }
 
 /// How phase fields in `D` dimensions are shown.
-pub trait Presentation<const D: usize>: Serialize + DeserializeOwned {
+pub trait Presentation<const D: usize>: Serialize + DeserializeOwned + Sync {
     /// That of a shape that is given on a grid or by a formula.
     fn of_box(grid: &Grid<D>) -> Result<Self>;
 

@@ -256,10 +256,16 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         let u = run.stored();
         if has_interface(u) {
             let (start, eps) = (&run.case().initial, run.case().scales.eps);
-            let picture = self.presentation.picture(start, u, eps)?.to_png()?;
-            directory.write_file(&format!("{stem}.png"), &picture)?;
-            if let Some(faired) = faired {
-                let figure = faired.displacement.figure()?.to_svg()?;
+            let (picture, figure) = rayon::join(
+                || -> Result<Vec<u8>> { Ok(self.presentation.picture(start, u, eps)?.to_png()?) },
+                || {
+                    faired.map(|faired| -> Result<String> {
+                        Ok(faired.displacement.figure()?.to_svg()?)
+                    })
+                },
+            );
+            directory.write_file(&format!("{stem}.png"), &picture?)?;
+            if let Some(figure) = figure.transpose()? {
                 directory.write_file(presentation::DISPLACEMENT, figure.as_bytes())?;
             }
             self.write_shape(u, eps, faired, stem, directory)?;

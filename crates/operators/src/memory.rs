@@ -2,7 +2,9 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Write;
-use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use std::{process, thread};
 
 use crate::fft::Real;
 
@@ -16,6 +18,11 @@ pub const REFUSED: i32 = 2;
 /// Ends the program. Nothing here allocates.
 #[cold]
 fn refuse(size: usize) -> ! {
+    static SAID: AtomicBool = AtomicBool::new(false);
+    // Another thread is ending it.
+    while SAID.swap(true, Ordering::Relaxed) {
+        thread::sleep(Duration::from_secs(1));
+    }
     let mut line = [0; 256];
     let mut rest = &mut line[..];
     // It is long enough.

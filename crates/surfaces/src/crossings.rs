@@ -51,11 +51,15 @@ impl TriangleMesh {
         /// Rounds in which such vertices go half of their way back, before they and more and more of their neighbours go all of it.
         const HALVINGS: usize = 4;
         const ROUNDS: usize = 12;
-        let crossed = before.crossing_faces();
+        let mut crossed_before = None;
         for round in 0..ROUNDS {
             let crosses = self.crossing_faces();
+            if !crosses.contains(&true) {
+                return self;
+            }
+            let crossed = crossed_before.get_or_insert_with(|| before.crossing_faces());
             let mut goes_back = vec![false; self.vertices.len()];
-            let tangled = (self.faces.iter().zip(&crosses).zip(&crossed))
+            let tangled = (self.faces.iter().zip(&crosses).zip(&*crossed))
                 .filter(|((_, now), before)| **now && !**before);
             for ((face, _), _) in tangled {
                 mark(&mut goes_back, face);

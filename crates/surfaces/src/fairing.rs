@@ -1,5 +1,7 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
+use std::collections::HashMap;
+
 use geometry::{PhaseField, Placement, distances_from_phase_field};
 use rayon::prelude::*;
 
@@ -60,6 +62,9 @@ pub struct Fairing {
     /// How many vertices at the end belong to lids, which are no part of what is faired.
     pub lids: usize,
 }
+
+/// Faces are close together in a cube of this part of the width below which parts are thin.
+const CLOSE: f64 = 0.25;
 
 /// The vertices of the start of a fairing in the box of a grid.
 #[derive(Clone, Debug)]
@@ -159,18 +164,23 @@ impl Fairing {
     }
 
     /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or at a face where the
-    /// start, or the gap before it, is thinner than `width`.
+    /// start, or the gap before it, is thinner than `width`. Of faces that are close together and look to the same side, one is measured.
     pub fn unresolved(&self, followed: &Followed, width: f64) -> Vec<bool> {
         let mesh = self.start.mesh();
         let distance = MeshDistance::new(&self.start);
         let far = RESOLVED.1 * followed.eps;
         let mut lost: Vec<bool> = (followed.levels.iter().map(|level| level.abs() > far)).collect();
-        let thin = mesh.faces.par_iter().filter(|&&face| {
-            let centre = mesh.corners(face).into_iter().sum::<Vector>() / 3.0;
-            distance.is_thin(centre.to_array(), mesh.face_normal(face), width)
+        let groups = Groups::in_cubes(mesh, CLOSE * width);
+        let thin = groups.first.par_iter().map(|&face| {
+            let face = mesh.faces[face];
+            distance.is_thin(centre(mesh, face), mesh.face_normal(face), width)
         });
-        for vertex in thin.collect::<Vec<_>>().into_iter().flatten() {
-            lost[*vertex as usize] = true;
+        let thin: Vec<bool> = thin.collect();
+        let faces = mesh.faces.iter().zip(groups.of_faces);
+        for (face, _) in faces.filter(|(_, group)| thin[*group]) {
+            for &vertex in face {
+                lost[vertex as usize] = true;
+            }
         }
         lost
     }
@@ -261,6 +271,37 @@ fn without_short_waves(
         }
     }
     smooth
+}
+
+fn centre(mesh: &TriangleMesh, face: [u32; 3]) -> [f64; 3] {
+    (mesh.corners(face).into_iter().sum::<Vector>() / 3.0).to_array()
+}
+
+/// Groups of faces that are close together and look to the same side.
+struct Groups {
+    /// The group of each face.
+    of_faces: Vec<usize>,
+    /// The first face of each group.
+    first: Vec<usize>,
+}
+
+impl Groups {
+    /// Those in a cube of this side that look to the same one of its six sides.
+    fn in_cubes(mesh: &TriangleMesh, side: f64) -> Self {
+        let (mut places, mut first) = (HashMap::new(), Vec::new());
+        let of_face = |(number, &face): (usize, &[u32; 3])| -> usize {
+            let cube = centre(mesh, face).map(|x| (x / side).floor() as i64);
+            let normal = Vector::from_array(mesh.face_normal(face));
+            let axis = normal.abs().max_position();
+            let place = (cube, axis, normal[axis] > 0.0);
+            *places.entry(place).or_insert_with(|| {
+                first.push(number);
+                first.len() - 1
+            })
+        };
+        let of_faces = mesh.faces.iter().enumerate().map(of_face).collect();
+        Self { of_faces, first }
+    }
 }
 
 /// Puts the vertices that are kept where those of a rough mesh are.
