@@ -294,7 +294,6 @@ REFUSED = {
     "four arrays": lambda v, f: (v, f, v, v[:, 0]),
     "nothing": lambda v, f: None,
     "a number": lambda v, f: 3,
-    "open": lambda v, f: (v, f[:-5]),
     "collapsed": lambda v, f: (0 * v, f),
     "too far away": lambda v, f: (v + 1e16, f),
     "no such file": lambda v, f: "missing.ply",

@@ -65,7 +65,9 @@ class SharedSurfaces:
         """All walls as a ``pyvista.PolyData``, whose cells have the array ``BoundaryLabels`` with the labels behind and ahead of them."""
         import pyvista
 
-        walls = pyvista.PolyData.from_regular_faces(self.vertices, self.faces)
+        # The type of its argument has no widths of integers.
+        faces: Any = self.faces
+        walls = pyvista.PolyData.from_regular_faces(self.vertices, faces)
         walls.cell_data["BoundaryLabels"] = self.sides
         return walls
 
