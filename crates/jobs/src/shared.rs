@@ -22,14 +22,14 @@ use crate::volume::{self, named};
 const MARGIN: f64 = 3.0;
 /// Nodes of this lattice, at most.
 const MOST_NODES: f64 = 1e9;
-/// Rounds in which lengths are found by which the depths of labels differ, so that their volumes are right,
+/// Rounds in which a length for each label is found that is added to its depths, so that the volumes are right.
 const OFFSETS: usize = 4;
-/// in parts of a voxel, below which they are.
+/// The same for the counts of voxels, which are whole numbers.
+const COUNTS: usize = 8;
+/// The rounds end when the walls move by less than this part of a voxel.
 const ENOUGH: f64 = 0.002;
 /// Rounds that make triangles of walls better.
 const ROUNDS: usize = 8;
-/// The same for counts of voxels, which are whole numbers.
-const COUNTS: usize = 8;
 
 /// The smooth labels of a segmentation, which fill space without gaps and overlaps.
 #[derive(Clone, Debug)]
@@ -219,8 +219,8 @@ pub fn shared_labels_to_file(
 }
 
 /// Smooths all labels of a segmentation together, in memory: each by the flow that [`surfaces_of_labels`](crate::surfaces_of_labels) makes, and the
-/// background too, as what is outside of all labels together. A point that is not there belongs to the label in which it is deepest by its signed
-/// distances, each with a length of the label added, so that all labels keep the volumes of their voxels.
+/// background too, as what is outside of all labels together. A point belongs to the label in which it is deepest: the depth is minus the signed
+/// distance, plus a length for each label, so that all labels keep the volumes of their voxels.
 ///
 /// # Errors
 /// As [`run_in_memory`](crate::run_in_memory), and for a volume without labels.

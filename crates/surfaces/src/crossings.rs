@@ -4,11 +4,11 @@ use derive_more::Display;
 use rayon::prelude::*;
 
 use crate::closed::Seams;
+use crate::hierarchy::{Hierarchy, bounds};
+use crate::triangle::Triangle;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, TriangleMesh};
 
-/// Triangles in the smallest boxes.
-const LEAF: usize = 4;
 /// Distances from planes below this part of the lengths are rounding.
 const ROUNDING: f64 = 1e-12;
 /// Triangles that have less than this part of their sides in common touch each other.
@@ -33,18 +33,15 @@ pub struct Overlap {
 impl TriangleMesh {
     /// For each face, whether it crosses others, beyond what neighbours have in common.
     pub fn crossing_faces(&self) -> Vec<bool> {
-        let boxes = Boxes::new(self);
-        let faces = 0..self.faces.len();
+        let near = Faces::of(self);
         let crosses = |face| {
-            boxes.any(face, |other| {
-                boxes.share_less_than_an_edge(face, other) && boxes.cross(face, other)
+            near.any(face, |other| {
+                near.share_less_than_an_edge(face, other) && near.cross(face, other)
             })
         };
-        faces.into_par_iter().map(crosses).collect()
+        (0..self.faces.len()).into_par_iter().map(crosses).collect()
     }
-}
 
-impl TriangleMesh {
     /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
     /// there: in the end at their old places. So no face crosses others that did not before.
     pub fn untangled(mut self, before: &Self) -> Self {
@@ -107,12 +104,12 @@ impl Overlap {
     /// Of the parts of a mesh.
     pub(crate) fn of(mesh: &TriangleMesh, seams: &Seams) -> Option<Self> {
         let part = &seams.component;
-        let boxes = Boxes::new(mesh);
+        let near = Faces::of(mesh);
         let faces = (0..mesh.faces.len()).into_par_iter();
         let crossed = faces.map(|face| {
             let mut found = None;
-            boxes.any(face, |other| {
-                let crosses = part[face] != part[other] && boxes.overlap(face, other);
+            near.any(face, |other| {
+                let crosses = part[face] != part[other] && near.overlap(face, other);
                 found = crosses.then_some(other);
                 crosses
             });
@@ -138,13 +135,13 @@ impl Overlap {
 
 /// The pairs of patches of faces that cross or touch each other, each once or more.
 pub(crate) fn touching(mesh: &TriangleMesh, patch: &[usize]) -> Vec<[usize; 2]> {
-    let boxes = Boxes::new(mesh);
+    let near = Faces::of(mesh);
     let faces = (0..mesh.faces.len()).into_par_iter();
     let pairs = faces.map(|face| {
         let mut found: Vec<[usize; 2]> = Vec::new();
-        boxes.any(face, |other| {
+        near.any(face, |other| {
             let pair = [patch[face], patch[other]];
-            if pair[0] < pair[1] && !found.contains(&pair) && boxes.overlap(face, other) {
+            if pair[0] < pair[1] && !found.contains(&pair) && near.overlap(face, other) {
                 found.push(pair);
             }
             false
@@ -160,88 +157,38 @@ fn mark(marks: &mut [bool], face: &[u32; 3]) {
     }
 }
 
-/// Boxes around all faces, around halves of them, and so on.
-struct Boxes<'a> {
+/// The faces of a mesh, and which of them are near each other.
+struct Faces<'a> {
     mesh: &'a TriangleMesh,
-    triangles: Vec<[Vector; 3]>,
-    nodes: Vec<Node>,
-    /// The faces of the smallest boxes, in a row.
+    triangles: Vec<Triangle>,
+    /// None without faces.
+    hierarchy: Option<Hierarchy>,
+    /// The faces in the order of the hierarchy.
     order: Vec<usize>,
 }
 
-struct Node {
-    low: Vector,
-    high: Vector,
-    /// The faces, where it is one of the smallest, or the second half; the first one follows the node.
-    inside: Inside,
-}
-
-enum Inside {
-    Faces(std::ops::Range<usize>),
-    SecondHalf(usize),
-}
-
-impl<'a> Boxes<'a> {
-    fn new(mesh: &'a TriangleMesh) -> Self {
+impl<'a> Faces<'a> {
+    fn of(mesh: &'a TriangleMesh) -> Self {
         let triangles: Vec<_> = mesh.faces.iter().map(|&face| mesh.corners(face)).collect();
-        let mut boxes = Self {
+        let ordered = (!triangles.is_empty()).then(|| Hierarchy::new(&triangles));
+        let (hierarchy, order) = ordered.unzip();
+        Self {
             mesh,
-            order: (0..triangles.len()).collect(),
             triangles,
-            nodes: Vec::new(),
-        };
-        let mut order = std::mem::take(&mut boxes.order);
-        if !order.is_empty() {
-            boxes.divide(&mut order, 0);
+            hierarchy,
+            order: order.unwrap_or_default(),
         }
-        boxes.order = order;
-        boxes
     }
 
-    fn divide(&mut self, order: &mut [usize], begin: usize) {
-        let corners = || order.iter().flat_map(|&face| self.triangles[face]);
-        let low = corners().fold(Vector::INFINITY, Vector::min);
-        let high = corners().fold(Vector::NEG_INFINITY, Vector::max);
-        let number = self.nodes.len();
-        self.nodes.push(Node {
-            low,
-            high,
-            inside: Inside::Faces(begin..begin + order.len()),
-        });
-        if order.len() <= LEAF {
-            return;
-        }
-        let axis = (high - low).max_position();
-        let centre = |face: &usize| self.triangles[*face].iter().map(|x| x[axis]).sum::<f64>();
-        let half = order.len() / 2;
-        order.select_nth_unstable_by(half, |a, b| centre(a).total_cmp(&centre(b)));
-        let (first, second) = order.split_at_mut(half);
-        self.divide(first, begin);
-        self.nodes[number].inside = Inside::SecondHalf(self.nodes.len());
-        self.divide(second, begin + half);
-    }
-
-    /// Whether this holds for any face whose box touches that of a face.
+    /// Whether this holds for any face near a face.
     fn any(&self, face: usize, mut holds: impl FnMut(usize) -> bool) -> bool {
-        let [a, b, c] = self.triangles[face];
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let mut open = vec![0];
-        while let Some(number) = open.pop() {
-            let node = &self.nodes[number];
-            if node.low.cmpgt(high).any() || node.high.cmplt(low).any() {
-                continue;
-            }
-            match &node.inside {
-                Inside::SecondHalf(second) => open.extend([number + 1, *second]),
-                Inside::Faces(range) => {
-                    let mut others = self.order[range.clone()].iter();
-                    if others.any(|&other| other != face && holds(other)) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
+        let bounds = bounds([&self.triangles[face]]);
+        let mut is_other = |place: usize| {
+            let other = self.order[place];
+            other != face && holds(other)
+        };
+        (self.hierarchy.as_ref())
+            .is_some_and(|hierarchy| hierarchy.any_touching(&bounds, &mut is_other))
     }
 
     /// Neighbours across an edge have no more in common, unless they lie on each other.

@@ -123,6 +123,35 @@ impl Hierarchy {
         best
     }
 
+    /// Whether this holds for any triangle in a box of the last level that touches these bounds.
+    pub(crate) fn any_touching(
+        &self,
+        bounds: &BoundingBox<3>,
+        holds: &mut impl FnMut(usize) -> bool,
+    ) -> bool {
+        self.any_in(0, 0..self.triangles.len(), bounds, holds)
+    }
+
+    fn any_in(
+        &self,
+        node: usize,
+        range: std::ops::Range<usize>,
+        bounds: &BoundingBox<3>,
+        holds: &mut impl FnMut(usize) -> bool,
+    ) -> bool {
+        let own = &self.boxes[node];
+        if (0..3).any(|k| own.lower[k] > bounds.upper[k] || own.upper[k] < bounds.lower[k]) {
+            return false;
+        }
+        let first = 2 * node + 1;
+        if first >= self.boxes.len() {
+            return range.into_iter().any(holds);
+        }
+        let middle = range.start.midpoint(range.end);
+        self.any_in(first, range.start..middle, bounds, holds)
+            || self.any_in(first + 1, middle..range.end, bounds, holds)
+    }
+
     fn search(
         &self,
         x: Vector,

@@ -25,7 +25,7 @@ const LAST_STEPS: usize = 6;
 const FLAT: f64 = 0.1;
 
 /// By how much a point is deeper in the first of two labels than in the second, and the gradient of this.
-pub type Depths<'a> = dyn Fn([u32; 2], [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
+pub type DepthDifference<'a> = dyn Fn([u32; 2], [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
 
 /// The walls between labels, as one mesh: every point of space belongs to one label, and a wall is there once, with a label on either side.
 /// Labels are counted from 0, which is the [`BACKGROUND`].
@@ -34,7 +34,7 @@ pub type Depths<'a> = dyn Fn([u32; 2], [f64; 3]) -> (f64, [f64; 3]) + Sync + 'a;
 pub struct LabelMesh {
     /// The triangles. Their normals point from the first label of their sides to the second.
     pub mesh: TriangleMesh,
-    /// For every face the labels behind it and in front of it. The background is in front of all walls that it has; of others the smaller number is
+    /// For every face the labels behind it and ahead of it. The background is ahead of all walls that it has; of others the smaller number is
     /// behind.
     pub sides: Vec<[u32; 2]>,
     /// For every vertex the labels that meet there, in ascending order.
@@ -49,7 +49,7 @@ impl LabelMesh {
         let faces = self.mesh.faces.iter().zip(&self.sides);
         let faces = faces.filter_map(|(&[a, b, c], sides)| match sides {
             [behind, _] if *behind == label => Some([a, b, c]),
-            [_, before] if *before == label => Some([a, c, b]),
+            [_, ahead] if *ahead == label => Some([a, c, b]),
             _ => None,
         });
         let mut surface = TriangleMesh {
@@ -64,7 +64,7 @@ impl LabelMesh {
     /// The walls with triangles of better shapes, where labels are equally deep: in every round vertices move towards the middle of their neighbours
     /// on the wall, those on a curve where three labels meet towards the middle of their neighbours on the curve, and back to where the depths of
     /// their labels are the same. None goes further than a cell from where it was.
-    pub fn relaxed(&self, rounds: usize, deeper: &Depths<'_>) -> Self {
+    pub fn relaxed(&self, rounds: usize, deeper: &DepthDifference<'_>) -> Self {
         let (around, first) = (self.neighbours(), self.mesh.points());
         let moved = |from: &[Vector], part: f64, steps: usize| -> Vec<Vector> {
             let vertices = (0..from.len()).into_par_iter();
@@ -89,7 +89,13 @@ impl LabelMesh {
     }
 
     /// Near a point, where the labels that meet at a vertex are equally deep.
-    fn on_walls(&self, vertex: usize, from: Vector, steps: usize, deeper: &Depths<'_>) -> Vector {
+    fn on_walls(
+        &self,
+        vertex: usize,
+        from: Vector,
+        steps: usize,
+        deeper: &DepthDifference<'_>,
+    ) -> Vector {
         let labels = &self.meeting[vertex];
         let mut x = from;
         for _ in 0..steps {

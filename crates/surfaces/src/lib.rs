@@ -95,7 +95,7 @@ pub use fairing::{Fairing, Followed};
 pub use filling::{Cells, Filling};
 pub use format::{up_axis, up_axis_of, usual_up_axis};
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
-pub use label_mesh::{BACKGROUND, Depths, LabelLattice, LabelMesh};
+pub use label_mesh::{BACKGROUND, DepthDifference, LabelLattice, LabelMesh};
 pub use lids::Lids;
 pub use mending::{Covered, Mended};
 pub use mesh::TriangleMesh;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::closed::{Depths, Seams, drop_unreferenced, has_no_area, is_flat};
 use crate::half_edges::HalfEdges;
-use crate::mesh::has_three_corners;
+use crate::mesh::{has_three_corners, key};
 use crate::repair::orient;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error, Overlap, TriangleMesh, Warning};
@@ -275,11 +275,6 @@ impl Mending {
         self.note(bodies, Warning::Bodies);
         self.note(shells, Warning::InsideOut);
     }
-}
-
-/// The coordinates as bits, by which equal positions are found; -0 is 0.
-fn key(x: [f64; 3]) -> [u64; 3] {
-    x.map(|v| (v + 0.0).to_bits())
 }
 
 /// For every vertex the first one that it is joined to by a chain of vertices near to each other.

@@ -189,14 +189,18 @@ pub(crate) fn has_three_corners(&[a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
+/// The coordinates as bits, by which equal positions are found.
+pub(crate) fn key(x: [f64; 3]) -> [u64; 3] {
+    // Adding zero turns -0 into 0.
+    x.map(|v| (v + 0.0).to_bits())
+}
+
 /// For every distinct position (`-0` equals `0`) the first vertex there, and for every vertex the number of its position.
 pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) {
     let mut known = HashMap::with_capacity(vertices.len());
     let mut first = Vec::new();
     let index = vertices.iter().enumerate().map(|(vertex, x)| {
-        // Adding zero turns -0 into 0.
-        let key = x.map(|v| (v + 0.0).to_bits());
-        *known.entry(key).or_insert_with(|| {
+        *known.entry(key(*x)).or_insert_with(|| {
             first.push(vertex);
             first.len() as u32 - 1
         })
