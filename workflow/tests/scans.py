@@ -1,4 +1,4 @@
-"""Makes a folder of 30 scans, of which one is broken, one is open and one is empty: python3 scans.py FOLDER"""
+"""Makes a folder of 30 scans, of which one is broken, one has a fin and one is empty: python3 scans.py FOLDER"""
 
 import subprocess
 import sys
@@ -21,9 +21,9 @@ def make(folder: Path, program: str = "willmore") -> None:
     whole = (folder / "scan 00.ply").read_bytes()
     (folder / "broken.ply").write_bytes(whole[: len(whole) // 2])
     (folder / "empty.stl").touch()
-    lines = (folder / "scan 01.obj").read_text(encoding="utf-8").splitlines(keepends=True)
-    faces = [line for line in lines if line.startswith("f ")]
-    (folder / "open.obj").write_text("".join(line for line in lines if line not in faces[:5]), encoding="utf-8")
+    text = (folder / "scan 01.obj").read_text(encoding="utf-8")
+    first, second, _ = next(line for line in text.splitlines() if line.startswith("f ")).split()[1:]
+    (folder / "fin.obj").write_text(f"{text}v 1 1 1\nf {first} {second} -1\n", encoding="utf-8")
     (folder / "notes.txt").write_text("No scan, and so in no table.\n", encoding="utf-8")
 
 
