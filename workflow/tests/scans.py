@@ -1,4 +1,4 @@
-"""Makes a folder of 30 scans, of which one is broken, one has a fin and one is empty: python3 scans.py FOLDER"""
+"""Makes a folder of 30 scans, of which one is truncated, one has an edge of three faces and one is empty: python3 scans.py FOLDER"""
 
 import subprocess
 import sys
