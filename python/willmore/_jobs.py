@@ -20,6 +20,7 @@ def fair(
     mesh: Any,
     *,
     noise: float | None = None,
+    edges: Literal["auto", "keep", "round"] | None = None,
     max_distance: float | None = None,
     fixed: Any = None,
     volume: Any = "keep",
@@ -46,6 +47,9 @@ def fair(
         that is open does not move.
     noise : float, optional
         Standard deviation of the noise along the normals, in the units of the mesh. By default it is estimated.
+    edges : "auto", "keep" or "round", optional
+        Whether sharp edges stay sharp where noise is taken off: where the evidence is clear for a closed part of the mesh (auto, the default), also where
+        it is weak (keep), or nowhere (round).
     max_distance : float, optional
         Largest distance of the vertices from the mesh that came in, in its units. By default there is no such bound.
     fixed : (n,) array of bool, or str, optional
@@ -101,6 +105,7 @@ def fair(
         volume = None
     options = {
         "noise": noise,
+        "edges": edges,
         "max_distance": max_distance,
         "keep": region,
         "volume": volume,

@@ -9,6 +9,7 @@ use crate::parts::{DETAIL, MAX_DISTANCE};
 use crate::paths::{absolute, to_text};
 use crate::prelude::*;
 use crate::values::SizeTarget;
+use surfaces::Edges;
 
 /// Energies below this have only balls, which have `8 pi`.
 const BALL: f64 = 1.2 * 8.0 * PI;
@@ -40,6 +41,17 @@ impl FairOptions {
             || self.run.steps.is_some()
     }
 
+    /// An option that is given and says something of the vertices of a mesh in a file.
+    fn option_of_meshes(&self) -> Option<&'static str> {
+        let given = [
+            ("noise", self.noise.is_some()),
+            ("keep", self.keep.is_some()),
+            ("edges", self.edges.is_some()),
+        ];
+        let mut given = given.into_iter().filter(|(_, is_given)| *is_given);
+        given.next().map(|(name, _)| name)
+    }
+
     pub(crate) fn check(&self) -> Result<()> {
         if let Some(ratio) = self.energy_ratio.filter(|ratio| *ratio >= 1.0) {
             return Err(Refusal::EnergyRatio(ratio).into());
@@ -52,6 +64,7 @@ impl FairOptions {
 
     pub(crate) fn load(&mut self, device: DeviceKind, watcher: &dyn Watcher) -> Result<Loaded> {
         let ends = self.says_when_to_end();
+        let of_meshes = self.option_of_meshes();
         let mut reader = self.input.reader(&self.operator, device, watcher)?;
         reader.allows_loss = Some(self.allow_loss);
         if self.detail.is_some() && !matches!(reader.source, Source::Volume(_)) {
@@ -68,8 +81,8 @@ impl FairOptions {
         }
         let loaded = match reader.source.clone() {
             Source::Mesh(file) => return self.load_mesh(&file, device, watcher),
-            Source::Volume(_) if self.noise.is_some() || self.keep.is_some() => {
-                let given = self.noise.map_or("keep", |_| "noise");
+            Source::Volume(_) if of_meshes.is_some() => {
+                let given = of_meshes.unwrap_or_default();
                 let what = "a volume, of which a new mesh is made";
                 return Err(Error::foreign(given, "", what));
             }
@@ -97,7 +110,7 @@ impl FairOptions {
                 }
                 loaded
             }
-            _ if self.noise.is_some() || self.keep.is_some() || !ends => {
+            _ if of_meshes.is_some() || !ends => {
                 return Err(Refusal::NoiseOfNoMesh.into());
             }
             _ => reader.load()?,
@@ -128,6 +141,17 @@ impl FairOptions {
             file.read()?.into_owned()
         };
         let noise = self.noise.or(self.says_when_to_end().then_some(0.0));
+        let edges = self.edges.unwrap_or_default();
+        if self.edges.is_some_and(|edges| edges != Edges::Round) {
+            let what = match (self.remesh, noise) {
+                (true, _) => Some("`remesh`, which makes new edges"),
+                (_, Some(0.0)) => Some("a flow that takes no noise off"),
+                _ => None,
+            };
+            if let Some(what) = what {
+                return Err(Error::foreign("edges", "", what));
+            }
+        }
         let WillmoreOptions {
             volume,
             reduced_volume,
@@ -135,6 +159,7 @@ impl FairOptions {
         } = self.willmore;
         let (mut own, changes) = OwnMesh::new(path, bytes, noise, self.keep.clone(), self.remesh)?;
         own.max_distance = self.max_distance;
+        own.set_edges(edges);
         own.check_movable(path)?;
         own.keeps_volume = volume == Some(SizeTarget::Keep);
         own.drives_volume = matches!(volume, Some(SizeTarget::To(_))) || reduced_volume.is_some();

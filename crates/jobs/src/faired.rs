@@ -87,6 +87,12 @@ pub struct MeshReport {
     /// The part of the vertices that could not follow the flow, in percent; none for a new mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_behind_percent: Option<f64>,
+    /// How many edges of the mesh have stayed sharp; none is told where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept_edges: Option<usize>,
+    /// Their length, in the units of the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept_edges_length: Option<f64>,
     /// Whether the surface has a boundary, which does not move.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_open: bool,

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use engine::Storage;
 use model::Ratios;
+use surfaces::Edges;
 
 use crate::file::Input;
 use crate::keep;
@@ -431,6 +432,14 @@ pub struct FairOptions {
     /// segmentation, `noise` is refused: see `detail`.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub noise: Option<f64>,
+
+    /// Whether sharp edges stay sharp where noise is taken off: auto, keep or round [default: auto]
+    ///
+    /// auto keeps them in each closed part of a mesh for which the evidence is clear, such as a machine part, and leaves round shapes alone. keep also keeps
+    /// those for which the evidence near them is weak. round keeps none. The report says how many edges of the mesh are kept, and their length. With `remesh`
+    /// or without noise, edges are always round.
+    #[arg(long, value_name = "RULE", value_enum, hide_possible_values = true, help_heading = FLOW)]
+    pub edges: Option<Edges>,
 
     /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: 1.25 voxels]
     ///

@@ -313,8 +313,15 @@ fn of_mesh(mesh: &MeshReport) -> String {
         ),
         _ => String::new(),
     };
+    let edges = match (mesh.kept_edges, mesh.kept_edges_length) {
+        (Some(count), Some(length)) => format!(
+            "; sharp edges that have stayed sharp (`edges`): {count} of the mesh, {} long together",
+            five_digits(length)
+        ),
+        _ => String::new(),
+    };
     format!(
-        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}{bound}",
+        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}{edges}{bound}",
         mesh.displacement_rms,
         mesh.displacement_largest,
         mesh.displacement_rms_percent,

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Covered, Followed, Mended};
+use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, Mended};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -36,6 +36,9 @@ pub struct OwnMesh {
     /// The largest distance of vertices from the mesh as it was given.
     #[serde(default)]
     pub max_distance: Option<f64>,
+    /// Whether sharp edges stay.
+    #[serde(default)]
+    edges: Edges,
     /// Whether the zero level set takes its place in the end.
     #[serde(default)]
     pub is_new: bool,
@@ -176,7 +179,7 @@ impl OwnMesh {
         let lids = open
             .as_ref()
             .map_or(0, |open| closed.mesh().vertices.len() - open.vertices);
-        let fairing = Fairing::with_lids(closed, self.noise, stays, lids);
+        let fairing = Fairing::with_lids(closed, self.noise, stays, lids).with_edges(self.edges);
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
             return Err(Refusal::KeepsAll.into());
@@ -200,6 +203,14 @@ impl OwnMesh {
             followed: OnceLock::new(),
         }));
         Ok(changes)
+    }
+
+    /// Says whether sharp edges stay.
+    pub fn set_edges(&mut self, edges: Edges) {
+        self.edges = edges;
+        if let Some(loaded) = &mut self.loaded {
+            loaded.fairing.edges = edges;
+        }
     }
 
     /// A closed mesh of one that may be open, if its vertices follow the flow.
@@ -345,7 +356,10 @@ impl OwnMesh {
         }
         let fairing = self.fairing();
         let followed = self.followed(start, eps)?;
-        let mut moved = fairing.faired(followed, u)?;
+        let FairedMesh {
+            mesh: mut moved,
+            edges,
+        } = fairing.faired(followed, u)?;
         let open = self.loaded().open.as_ref();
         if let Some(open) = open {
             // The boundary has its noise, which the surface beside it follows.
@@ -404,6 +418,8 @@ impl OwnMesh {
         let mut report = MeshReport {
             noise: Some(self.noise),
             left_behind_percent: Some(100.0 * followed.left_behind(u)?),
+            kept_edges: (edges.count > 0).then_some(edges.count),
+            kept_edges_length: (edges.count > 0).then_some(edges.length),
             ..MeshReport::new(rough, &moved, &lengths)
         };
         if open.is_some() {

@@ -176,7 +176,7 @@ const SPACE: [(&str, &str); 8] = [
     ),
 ];
 
-const NUMBERS: [(&str, &str); 25] = [
+const NUMBERS: [(&str, &str); 27] = [
     (
         "/energy_terms/spontaneous_curvature",
         "Spontaneous curvature in the energy, in one over units of the input",
@@ -232,6 +232,14 @@ const NUMBERS: [(&str, &str); 25] = [
     (
         "/mesh/is_open",
         "Does the mesh have a boundary, which did not move?",
+    ),
+    (
+        "/mesh/kept_edges",
+        "Edges of the mesh that have stayed sharp",
+    ),
+    (
+        "/mesh/kept_edges_length",
+        "Their length, in units of the input",
     ),
     (
         "/mesh/max_distance",

@@ -18,7 +18,7 @@ pub const TAUBIN: [f64; 2] = [0.5, -0.53];
 const FACTORS: [f64; 2] = [0.5, -0.47];
 
 /// Vertices are worked on in pieces of this many.
-const CHUNK: usize = 1 << 12;
+pub(crate) const CHUNK: usize = 1 << 12;
 
 /// The neighbours of every vertex along edges, in ascending order.
 pub(crate) struct Umbrellas {

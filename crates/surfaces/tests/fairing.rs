@@ -138,7 +138,7 @@ fn vertices_follow_a_sphere_that_grows() {
     let followed = fairing.follow(placement, &field(0.3), eps).unwrap();
     let grown = field(0.33);
     assert_eq!(followed.left_behind(&grown).unwrap(), 0.0);
-    let moved = fairing.faired(&followed, &grown).unwrap();
+    let moved = fairing.faired(&followed, &grown).unwrap().mesh;
     for (vertex, x) in moved.vertices.iter().enumerate() {
         let radius = length(*x);
         let expected = match vertex {
@@ -181,7 +181,7 @@ fn a_fairing_takes_off_noise_before_the_flow_begins() {
         .unwrap();
     let start = distance.map(|s| optimal_profile(s, eps));
     let followed = fairing.follow(placement, &start, eps).unwrap();
-    let faired = fairing.faired(&followed, &start).unwrap();
+    let faired = fairing.faired(&followed, &start).unwrap().mesh;
     let ((_, before), (_, after)) = (radii(&noisy), radii(&faired));
     assert!(after < 0.5 * before, "{after} of {before}");
     assert!((faired.volume() / volume - 1.0).abs() < 1e-12);

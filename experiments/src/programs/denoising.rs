@@ -346,6 +346,6 @@ fn fair(
         Stop::Displacement(fairing.farthest() * placement.scale()),
     ];
     session.phase(title, |stage| {
-        Ok(fairing.faired(&followed, stage.run(case)?.stored())?)
+        Ok(fairing.faired(&followed, stage.run(case)?.stored())?.mesh)
     })
 }
