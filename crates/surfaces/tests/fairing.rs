@@ -7,18 +7,7 @@ use geometry::{Grid, Placement, optimal_profile};
 use rand::{RngExt, SeedableRng};
 use surfaces::{Fairing, MeshDistance, TriangleMesh, decode, rewrite};
 
-use crate::common::{closed, cube, length, sphere, torus};
-
-/// Normally distributed noise of this standard deviation along the normals.
-fn with_noise(mesh: &TriangleMesh, deviation: f64) -> TriangleMesh {
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut noisy = mesh.clone();
-    for (x, normal) in noisy.vertices.iter_mut().zip(mesh.vertex_normals()) {
-        let sum: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
-        *x = std::array::from_fn(|i| x[i] + deviation * (sum - 6.0) * normal[i]);
-    }
-    noisy
-}
+use crate::common::{closed, cube, length, sphere, torus, with_noise};
 
 fn radii(mesh: &TriangleMesh) -> (f64, f64) {
     let radii = mesh.vertices.iter().map(|x| length(*x));

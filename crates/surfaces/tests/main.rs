@@ -4,6 +4,7 @@ mod bounds;
 mod closed;
 mod common;
 mod distances;
+mod edges;
 mod fairing;
 mod files;
 mod fuzzing;

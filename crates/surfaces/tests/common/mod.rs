@@ -3,6 +3,8 @@
 
 pub mod files;
 
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use surfaces::{ClosedMesh, TriangleMesh};
 
 pub type Vector = [f64; 3];
@@ -195,4 +197,15 @@ pub fn rounded(value: f64, levels: f64) -> f64 {
     } else {
         value
     }
+}
+
+/// Normally distributed noise of this standard deviation along the normals.
+pub fn with_noise(mesh: &TriangleMesh, deviation: f64) -> TriangleMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut noisy = mesh.clone();
+    for (x, normal) in noisy.vertices.iter_mut().zip(mesh.vertex_normals()) {
+        let sum: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
+        *x = std::array::from_fn(|i| x[i] + deviation * (sum - 6.0) * normal[i]);
+    }
+    noisy
 }
