@@ -254,7 +254,7 @@ impl fmt::Display for Warning {
             Self::Flat { part } => write!(
                 f,
                 "{:.0} % of the vertices lie in a plane with those around them, where noise leaves none: what was taken for noise may be the \
-                 edges of the mesh, which become round; `noise` says how much noise there is",
+                 edges of the mesh, which may become round; `noise` says how much noise there is",
                 100.0 * part
             ),
             Self::Deep { path } => write!(
