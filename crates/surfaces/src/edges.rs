@@ -199,15 +199,15 @@ impl<'a> Sides<'a> {
         let is_long = |[a, _]: &[u32; 2]| lengths[chains.find(*a) as usize] >= CHAIN;
         sharp.into_iter().filter(is_long).collect()
     }
+}
 
-    /// What is kept of edges in a mesh, of those whose both ends are.
-    pub(crate) fn kept(
-        &self,
-        edges: &[[u32; 2]],
-        mesh: &TriangleMesh,
-        is_kept: impl Fn(u32) -> bool,
-    ) -> KeptEdges {
-        let kept = edges.iter().filter(|ends| ends.iter().all(|&v| is_kept(v)));
+impl Sharpened {
+    /// The edges whose both ends are kept, in a mesh.
+    pub(crate) fn kept(&self, mesh: &TriangleMesh, is_kept: impl Fn(u32) -> bool) -> KeptEdges {
+        let kept = self
+            .edges
+            .iter()
+            .filter(|ends| ends.iter().all(|&v| is_kept(v)));
         let lengths = kept.map(|ends| {
             let [a, b] = ends.map(|vertex| Vector::from_array(mesh.vertices[vertex as usize]));
             a.distance(b)

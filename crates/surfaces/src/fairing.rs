@@ -248,7 +248,7 @@ impl Fairing {
             counts: &counts,
             rounds: self.rounds,
         };
-        let (mesh, edges) = noisy.nearest(flowed, self.edges);
+        let (mesh, edges) = noisy.nearest(&flowed, self.edges);
         let mesh = self.held(mesh);
         Ok(FairedMesh { mesh, edges })
     }

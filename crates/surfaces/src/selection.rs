@@ -17,7 +17,7 @@ const LESS: [usize; 5] = [0, 1, 2, 4, 8];
 const GAIN_OF_LESS: [f64; 2] = [0.15, 0.3];
 /// Rounds in which these parts become gradual.
 const GRADUAL: usize = 2;
-/// A part of a mesh is one with edges if its mean gain is more than this. It is 0.07 and more for machine parts, and 0.04 and less for round shapes.
+/// A part of a mesh is one with edges if its mean gain is more than this. Chosen between noisy machine parts and freely curved surfaces.
 const CLEAR: f64 = 0.06;
 /// Gains from which sharp edges have some part of the mesh and all of it, where the evidence is clear,
 const GAIN_WHERE_CLEAR: [f64; 2] = [-0.1, 0.0];
@@ -76,7 +76,7 @@ impl<'a> Gains<'a> {
     }
 
     /// The flow, and less smoothing where that is nearer: where the shape has details that are as small as the edges.
-    fn with_less(&self, umbrellas: &Umbrellas, flowed: TriangleMesh) -> Selected {
+    fn with_less(&self, umbrellas: &Umbrellas, flowed: &TriangleMesh) -> Selected {
         let rough = self.noisy.rough.mesh();
         let mut best = vec![f64::NEG_INFINITY; flowed.vertices.len()];
         let mut less = flowed.clone();
@@ -138,8 +138,10 @@ impl<'a> Gains<'a> {
                 false => near * ramp(*gain, GAIN_ELSEWHERE),
             })
             .collect();
-        let mesh = blended(selected.mesh, &sharp.mesh, &parts);
-        let kept = sides.kept(&sharp.edges, &mesh, |vertex| parts[vertex as usize] > KEPT);
+        let mesh = blended(&selected.mesh, &sharp.mesh, &parts);
+        let kept = sharp.kept(&mesh, |vertex| parts[vertex as usize] > KEPT);
+        // What has no sharp edges in the end stays as it was.
+        let mesh = if kept.count == 0 { selected.mesh } else { mesh };
         (mesh, kept)
     }
 
@@ -173,7 +175,9 @@ impl<'a> Gains<'a> {
             let before = near.clone();
             for face in &self.noisy.rough.mesh().faces {
                 if face.iter().any(|&vertex| before[vertex as usize]) {
-                    face.iter().for_each(|&vertex| near[vertex as usize] = true);
+                    for &vertex in face {
+                        near[vertex as usize] = true;
+                    }
                 }
             }
         }
@@ -184,9 +188,9 @@ impl<'a> Gains<'a> {
 
 impl Noisy<'_> {
     /// What the flow has made of it, but with less smoothing or sharp edges where those are nearer to the mesh without noise.
-    pub(crate) fn nearest(&self, flowed: TriangleMesh, edges: Edges) -> (TriangleMesh, KeptEdges) {
+    pub(crate) fn nearest(&self, flowed: &TriangleMesh, edges: Edges) -> (TriangleMesh, KeptEdges) {
         let umbrellas = Umbrellas::of(self.rough.mesh());
-        let gains = Gains::new(self, &umbrellas, &flowed);
+        let gains = Gains::new(self, &umbrellas, flowed);
         let selected = gains.with_less(&umbrellas, flowed);
         match edges {
             Edges::Round => (selected.mesh, KeptEdges::default()),
@@ -201,7 +205,7 @@ fn ramp(x: f64, [from, to]: [f64; 2]) -> f64 {
 }
 
 /// A mesh with parts of another one, which has the same faces.
-fn blended(mesh: TriangleMesh, other: &TriangleMesh, parts: &[f64]) -> TriangleMesh {
+fn blended(mesh: &TriangleMesh, other: &TriangleMesh, parts: &[f64]) -> TriangleMesh {
     let pairs = mesh.points().into_iter().zip(other.points());
     let offset: Vec<_> = pairs
         .zip(parts)

@@ -57,7 +57,9 @@ impl Prism {
                 rim = inner;
             }
             if z < 0.0 {
-                faces.iter_mut().for_each(|face| face.swap(0, 1));
+                for face in &mut faces {
+                    face.swap(0, 1);
+                }
             }
             mesh.faces.extend(faces);
         }
