@@ -28,6 +28,7 @@ pub mod meshes;
 pub mod metrics;
 pub mod networks;
 pub mod options;
+pub mod others;
 pub mod prelude;
 pub mod products;
 pub mod programs;

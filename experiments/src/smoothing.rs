@@ -1,7 +1,6 @@
 //! What comparisons of smoothings of meshes share.
 
 use render::{Scene, View};
-use surfaces::Fairing;
 
 use crate::prelude::*;
 use crate::surfaces::raster;
@@ -20,21 +19,6 @@ pub fn rms_distance(mesh: &TriangleMesh, shape: &dyn SignedDistance<3>) -> f64 {
 pub fn rounds(mesh: &TriangleMesh, [lambda, mu]: [f64; 2]) -> impl Iterator<Item = TriangleMesh> {
     let round = move |mesh: &TriangleMesh| Some(mesh.smoothed(1, lambda, mu));
     std::iter::successors(round(mesh), round)
-}
-
-/// Willmore flow from signed distances as `willmore fair` makes it, without its ends and measures.
-pub fn fairing_flow(title: &str, distance: Field<3>) -> Result<Case<3>> {
-    let (distance, _) = surfaces::mend_signs(Stored::whole(distance));
-    let (grid, spacing) = (*distance.grid(), distance.grid().spacing());
-    let scales = Scales::of_grid(spacing, 2.0);
-    let initial = distance.map(|s| optimal_profile(s, scales.eps));
-    let rule = StepRule::Graded {
-        first: Fairing::first_step(spacing),
-        part: Fairing::GROWTH,
-    };
-    let mut operator = operator(ACCURATE, &grid, &scales)?;
-    operator.storage = Storage::Auto;
-    Ok(Case::willmore(title, initial, operator, scales, rule, 0))
 }
 
 /// A picture of a mesh in a frame.

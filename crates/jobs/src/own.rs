@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, Mended};
+use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, KeptEdges, Mended};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -358,7 +358,7 @@ impl OwnMesh {
         let followed = self.followed(start, eps)?;
         let FairedMesh {
             mesh: mut moved,
-            edges,
+            mut edges,
         } = fairing.faired(followed, u)?;
         let open = self.loaded().open.as_ref();
         if let Some(open) = open {
@@ -384,6 +384,9 @@ impl OwnMesh {
         let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
         moved = self.bounded(moved, volume, &free);
         moved = moved.untangled(rough.mesh());
+        if moved.vertices == rough.mesh().vertices {
+            edges = KeptEdges::default();
+        }
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());

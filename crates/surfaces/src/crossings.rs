@@ -43,16 +43,23 @@ impl TriangleMesh {
     }
 
     /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
-    /// there: in the end at their old places. So no face crosses others that did not before.
+    /// there: in the end at their old places. So no face crosses others that did not before. If `before` crosses itself in so many places that this leaves
+    /// nothing, the result is the one with the fewest faces that cross others, fewer than in `before`.
     pub fn untangled(mut self, before: &Self) -> Self {
         /// Rounds in which such vertices go half of their way back, before they and more and more of their neighbours go all of it.
         const HALVINGS: usize = 4;
         const ROUNDS: usize = 12;
+        let count = |crosses: &[bool]| crosses.iter().filter(|crosses| **crosses).count();
         let mut crossed_before = None;
+        let mut fewest: Option<(usize, Self)> = None;
         for round in 0..ROUNDS {
             let crosses = self.crossing_faces();
             if !crosses.contains(&true) {
                 return self;
+            }
+            let now = count(&crosses);
+            if fewest.as_ref().is_none_or(|(least, _)| now < *least) {
+                fewest = Some((now, self.clone()));
             }
             let crossed = crossed_before.get_or_insert_with(|| before.crossing_faces());
             let mut goes_back = vec![false; self.vertices.len()];
@@ -84,8 +91,11 @@ impl TriangleMesh {
                 *x = [0, 1, 2].map(|i| from[i] + part * (x[i] - from[i]));
             }
         }
-        // Knots that are larger than that are rare.
-        before.clone()
+        let before_them = crossed_before.map_or(0, |crossed| count(&crossed));
+        match fewest {
+            Some((now, mesh)) if now < before_them => mesh,
+            _ => before.clone(),
+        }
     }
 }
 

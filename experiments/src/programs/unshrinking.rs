@@ -1,11 +1,9 @@
 //! Segmentations made smooth by `willmore fair` and by what else there is, and how near the surfaces come to the shapes that were segmented.
 
-use std::process::Command;
-
 use jobs::{FairOptions, Input, Silent};
-use serde::Deserialize;
 use surfaces::TAUBIN;
 
+use crate::others::Others;
 use crate::prelude::*;
 use crate::segmentations::{BODIES, Segmentation, WRONG};
 use crate::smoothing::{LAPLACIAN, mesh_raster, rounds};
@@ -163,15 +161,18 @@ fn program(options: &Options) -> Result<()> {
         bodies.collect::<Result<Vec<_>>>()
     })?;
     let others = match &options.python {
-        Some(python) => session.phase("other programs", |_| Others::of(&bodies, python))?,
+        Some(python) => session.phase("other programs", |_| {
+            Others::smooth(python, |folder| {
+                let write = |body: &Segmentation| {
+                    let file = folder.join(format!("{}.nii", body.name));
+                    Ok(volumes::write(file, &body.volume)?)
+                };
+                bodies.iter().try_for_each(write)
+            })
+        })?,
         None => Others::default(),
     };
-    if !others.versions.is_empty() {
-        let versions: Vec<String> = (others.versions.iter())
-            .map(|(name, version)| format!("{name} {version}"))
-            .collect();
-        session.remark(format!("Other programs: {}.", versions.join(", ")));
-    }
+    others.tell(&mut session);
     let mut rows = Vec::new();
     for body in &bodies {
         let treated = treated(&mut session, body, &others, options)?;
@@ -267,7 +268,7 @@ fn treated<'a>(
         for name in ["surface_nets", "constrained"] {
             let mut best: Option<(f64, &OtherRun, Meshes)> = None;
             let runs = others.runs.iter();
-            for run in runs.filter(|run| run.body == body.name && run.method == name) {
+            for run in runs.filter(|run| run.of == body.name && run.method == name) {
                 let meshes = others.meshes(run)?;
                 if run.parameters.is_empty() {
                     rows.push(row(name, "defaults", Some(run.seconds), meshes.clone())?);
@@ -339,63 +340,6 @@ fn compare(session: &mut Session, rows: &[Row<'_>]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// What other programs made.
-#[derive(Deserialize, Default)]
-struct Others {
-    versions: BTreeMap<String, String>,
-    runs: Vec<OtherRun>,
-    #[serde(skip)]
-    folder: Option<tempfile::TempDir>,
-}
-
-#[derive(Deserialize)]
-struct OtherRun {
-    body: String,
-    method: String,
-    /// Empty for the defaults.
-    parameters: String,
-    seconds: f64,
-    files: Vec<String>,
-}
-
-impl Others {
-    /// Writes the bodies, and runs the programs.
-    fn of(bodies: &[Segmentation], python: &Path) -> Result<Self> {
-        let folder = tempfile::tempdir()?;
-        for body in bodies {
-            volumes::write(
-                folder.path().join(format!("{}.nii", body.name)),
-                &body.volume,
-            )?;
-        }
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/other_smoothings");
-        let status = Command::new(python)
-            .arg(script)
-            .arg(folder.path())
-            .status()?;
-        require(
-            status.success(),
-            "scripts/other_smoothings failed, as it says",
-        )?;
-        let told = files::read(folder.path().join("others.json"))?;
-        Ok(Self {
-            folder: Some(folder),
-            ..serde_json::from_slice(&told)?
-        })
-    }
-
-    fn meshes(&self, run: &OtherRun) -> Result<Meshes> {
-        let folder = self
-            .folder
-            .as_ref()
-            .map_or(Path::new(""), |folder| folder.path());
-        run.files
-            .iter()
-            .map(|file| Ok(surfaces::read(folder.join(file))?))
-            .collect()
-    }
 }
 
 impl Row<'_> {
