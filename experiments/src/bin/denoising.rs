@@ -1,4 +1,4 @@
-//! Noise taken off meshes by Willmore flow, by Taubin's smoothing and by Laplacian smoothing.
+//! Noise taken off meshes by Willmore flow, by Taubin's and Laplacian smoothing, by MeshLib and by filtered normals.
 
 // Written by `cargo run -p experiments -- --write`.
 fn main() -> std::process::ExitCode {

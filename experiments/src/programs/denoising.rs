@@ -195,6 +195,12 @@ struct Row<'a> {
     result: TriangleMesh,
 }
 
+impl Row<'_> {
+    fn key(&self) -> String {
+        format!("{}.{}", self.of.key(), self.method)
+    }
+}
+
 /// Root of the mean square distance of the vertices to the clean surface, in percent of the longest side; the mean angle to its normals;
 /// the change of the volume.
 const QUALITY: [(&str, Format, &str); 3] = [
@@ -320,8 +326,8 @@ fn denoise<'a>(
     for (colour, method, factors) in [(1, "taubin", TAUBIN), (2, "laplacian", LAPLACIAN)] {
         let rounds = rounds(&of.mesh, factors).take(ITERATIONS);
         let all: Vec<Numbers> = session.phase(format!("{title}: {method}"), |_| {
-            rounds.map(|mesh| clean.quality(&mesh)).collect()
-        });
+            Ok::<_, crate::Error>(rounds.map(|mesh| clean.quality(&mesh)).collect())
+        })?;
         let best = (0..ITERATIONS).min_by(|&a, &b| all[a]["rms"].total_cmp(&all[b]["rms"]));
         let best = best.unwrap_or(0) + 1;
         let clock = Instant::now();

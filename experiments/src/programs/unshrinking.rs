@@ -3,7 +3,7 @@
 use jobs::{FairOptions, Input, Silent};
 use surfaces::TAUBIN;
 
-use crate::others::Others;
+use crate::others::{OtherRun, Others};
 use crate::prelude::*;
 use crate::segmentations::{BODIES, Segmentation, WRONG};
 use crate::smoothing::{LAPLACIAN, mesh_raster, rounds};
