@@ -1,5 +1,6 @@
 //! A person's own files: parts of a mesh that stay, standard input and output, fields on other grids.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
@@ -54,6 +55,70 @@ fn edges_between_flat_sides_are_told_before_they_become_round() {
         assert_eq!(said.status.success(), is_noisy, "{error}");
         assert_eq!(error.contains("is the shape itself"), !is_noisy, "{error}");
     }
+}
+
+/// A block of 24 by 24 by 12 squares of side 1, each of two triangles.
+fn block() -> TriangleMesh {
+    const SIZE: [i32; 3] = [24, 24, 12];
+    let mut mesh = TriangleMesh::default();
+    let mut numbers = HashMap::new();
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
+        let [across, along] = [(axis + 1) % 3, (axis + 2) % 3];
+        let steps = (0..SIZE[across]).flat_map(|i| (0..SIZE[along]).map(move |j| [i, j]));
+        for [i, j] in steps {
+            let mut corner = |a: i32, b: i32| {
+                let mut at = [0; 3];
+                (at[axis], at[across], at[along]) = (i32::from(side) * SIZE[axis], i + a, j + b);
+                *numbers.entry(at).or_insert_with(|| {
+                    mesh.vertices.push(at.map(f64::from));
+                    mesh.vertices.len() as u32 - 1
+                })
+            };
+            let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            let [b, d] = if side { [b, d] } else { [d, b] };
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
+}
+
+#[test]
+fn sharp_edges_of_a_noisy_block_stay_unless_they_are_to_become_round() {
+    let folder = tempfile::tempdir().unwrap();
+    let clean = block();
+    let (solid, _) = ClosedMesh::new(clean.clone()).unwrap();
+    let distance = surfaces::MeshDistance::new(&solid);
+    let mut noisy = clean.clone();
+    noisy.roughen(0.25, 3);
+    surfaces::write(folder.path().join("block.ply"), &noisy).unwrap();
+    let faired = |rule: &[&str]| {
+        let fair = [
+            "fair",
+            "block.ply",
+            "--cells",
+            "48",
+            "--save",
+            "out.ply",
+            "--force",
+        ];
+        let outcome = outcome(folder.path(), &[&fair[..], rule].concat());
+        let mesh = surfaces::read(folder.path().join("out.ply")).unwrap();
+        let distances = distance.signed_distances(&mesh.vertices);
+        let squares: f64 = distances.iter().map(|d| d * d).sum();
+        (
+            outcome["mesh"].clone(),
+            (squares / distances.len() as f64).sqrt(),
+        )
+    };
+    let (told, kept) = faired(&["--output", "auto"]);
+    // Twelve edges, 240 long.
+    let count = told["kept_edges"].as_u64().unwrap();
+    assert!((220..=245).contains(&count), "{told}");
+    let length = told["kept_edges_length"].as_f64().unwrap();
+    assert!((length / 240.0 - 1.0).abs() < 0.1, "{told}");
+    let (told, round) = faired(&["--output", "round", "--edges", "round"]);
+    assert!(told["kept_edges"].is_null(), "{told}");
+    assert!(kept < 0.7 * round, "{kept} {round}");
 }
 
 #[test]

@@ -305,10 +305,9 @@ fn details_below_a_length_go() {
         });
         distances.fold(0.0, f64::max) - 13.0
     };
-    let heights = [2.0, 1.0, 0.5].map(height);
-    assert!(heights.is_sorted(), "{heights:?}");
+    let heights = [2.0, 0.5].map(height);
     assert!(
-        heights[0] < 0.25 * BUMP[1] && heights[2] > 0.6 * BUMP[1],
+        heights[0] < 0.25 * BUMP[1] && heights[1] > 0.6 * BUMP[1],
         "{heights:?}"
     );
     for (arguments, part) in [
