@@ -174,6 +174,18 @@ impl Sums {
     }
 }
 
+/// Area (2D) or volume (3D) of the ball of a radius.
+///
+/// ```
+/// use geometry::zero_set::ball_volume;
+/// # use std::f64::consts::PI;
+/// assert!((ball_volume(2, 3.0) - 9.0 * PI).abs() < 1e-12);
+/// assert!((ball_volume(3, 3.0) - 36.0 * PI).abs() < 1e-12);
+/// ```
+pub fn ball_volume(dimension: usize, radius: f64) -> f64 {
+    unit_ball(dimension) * radius.powi(dimension as i32)
+}
+
 /// Length (2D) or area (3D) of the ball of a volume, which no set of that volume in space undercuts.
 ///
 /// ```

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::layer::{Around, Layer, NEIGHBOURS, SHARE};
+use super::layer::{Around, Layer, NEIGHBOURS, SHARE, Steepness};
 use crate::{Error, PhaseField, parallel, vector};
 
 /// Perimeter and volume of the zero set as functions of the nodal values, at one phase field: values, gradients, and products with
@@ -87,12 +87,16 @@ impl<const D: usize> Sizes<D> {
             let (layer, kernel) = (&self.layer, self.layer.kernel);
             let (around, gradients, normals) = (layer.around(), layer.gradients(), layer.normals());
             let fluxes = layer.map(|place| match layer.near(place) {
-                Some(d) => vector::scale(normals[place], kernel.value(d)),
+                Some(d) => {
+                    let steepness = Steepness::of(gradients[place]);
+                    vector::scale(normals[place], kernel.value(d) * steepness.slope)
+                }
                 None => [0.0; D],
             });
             layer.map(|place| {
-                let own = (layer.near(place))
-                    .map_or(0.0, |d| kernel.slope(d) * vector::norm(gradients[place]));
+                let own = (layer.near(place)).map_or(0.0, |d| {
+                    kernel.slope(d) * Steepness::of(gradients[place]).value
+                });
                 layer.grid.cell_volume() * (own - layer.divergence(&around[place], &fluxes))
             })
         })
@@ -126,21 +130,22 @@ impl<const D: usize> Sizes<D> {
         sums
     }
 
-    /// Second derivatives at one node with a weight: by the distance variable, by that and the gradient along the normal, and by the
-    /// tangential gradient.
+    /// Second derivatives at one node with a weight: by the distance variable, by that and the gradient along the normal, by the
+    /// tangential gradient, and by that along the normal.
     fn second_at(
         &self,
         (place, gradient): (usize, [f64; D]),
         [perimeter, volume]: [f64; 2],
-    ) -> [f64; 3] {
+    ) -> [f64; 4] {
         let (kernel, cell) = (self.layer.kernel, self.layer.grid.cell_volume());
         let d = self.layer.near(place).unwrap_or(f64::INFINITY);
-        let gradient = vector::norm(gradient).max(f64::MIN_POSITIVE);
-        let own = perimeter * kernel.curvature(d) * gradient - volume * kernel.slope(d);
+        let steepness = Steepness::of(gradient);
+        let own = perimeter * kernel.curvature(d) * steepness.value - volume * kernel.slope(d);
         [
             own,
-            perimeter * kernel.slope(d),
-            perimeter * kernel.value(d) / gradient,
+            perimeter * kernel.slope(d) * steepness.slope,
+            perimeter * kernel.value(d) * steepness.ratio,
+            perimeter * kernel.value(d) * steepness.curvature,
         ]
         .map(|v| cell * v)
     }
@@ -183,8 +188,8 @@ struct Site<const D: usize> {
     /// The first derivative by the distance variable, times the second of that by the value.
     bent: f64,
     normal: [f64; D],
-    /// Second derivatives by the distance variable, by that and the gradient along the normal, and by the tangential gradient.
-    second: [f64; 3],
+    /// Second derivatives by the distance variable, by that and the gradient along the normal, by the tangential gradient, and by that along the normal.
+    second: [f64; 4],
 }
 
 impl<const D: usize> SizeHessian<D> {
@@ -219,7 +224,7 @@ impl<const D: usize> SizeHessian<D> {
                 second: if active[place] {
                     sizes.second_at((place, gradients[place]), weights)
                 } else {
-                    [0.0; 3]
+                    [0.0; 4]
                 },
             }
         };
@@ -239,9 +244,9 @@ impl<const D: usize> SizeHessian<D> {
                 slope,
                 bent: first[place] * curvature,
                 normal: [0.0; D],
-                second: counts(layer, place).map_or([0.0; 3], |d| {
+                second: counts(layer, place).map_or([0.0; 4], |d| {
                     let own = -weight * layer.kernel.slope(d);
-                    [layer.grid.cell_volume() * own, 0.0, 0.0]
+                    [layer.grid.cell_volume() * own, 0.0, 0.0, 0.0]
                 }),
             })
         };
@@ -279,7 +284,7 @@ impl<const D: usize> SizeHessian<D> {
 impl<const D: usize> Site<D> {
     /// How the derivatives by the distance variable and by its gradient change with it.
     fn change(&self, shift: f64, shifts: &[f64], weights: &[f64; NEIGHBOURS]) -> (f64, [f64; D]) {
-        let [own, mixed, tangential] = self.second;
+        let [own, mixed, tangential, steep] = self.second;
         let turn: [f64; D] = self.around.map(|around| {
             let values = around
                 .iter()
@@ -292,7 +297,7 @@ impl<const D: usize> Site<D> {
         let along = vector::dot(self.normal, turn);
         let sideways = vector::sub(turn, vector::scale(self.normal, along));
         let flux = vector::add(
-            vector::scale(self.normal, mixed * shift),
+            vector::scale(self.normal, mixed * shift + steep * along),
             vector::scale(sideways, tangential),
         );
         (own * shift + mixed * along, flux)
