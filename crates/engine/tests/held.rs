@@ -56,7 +56,7 @@ fn a_reduced_volume_is_reached_and_then_the_shape_rests() {
     }
 }
 
-/// The area is to vanish nearly at once, which no step can do: a part of it is made.
+/// The area is to become a hundredth at once, which no step can do: a part of it is made.
 #[test]
 fn a_step_that_cannot_hold_its_target_is_halved_with_it() {
     let mut case = driven(1, StepRule::Constant(TAU));
@@ -65,7 +65,7 @@ fn a_step_that_cannot_hold_its_target_is_halved_with_it() {
         perimeter: None,
         volume: Some(Target {
             from: area,
-            to: 0.001 * area,
+            to: 0.01 * area,
             over: 1,
         }),
     };

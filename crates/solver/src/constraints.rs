@@ -7,11 +7,15 @@
 //!   `H` the second derivative of `E + lambda C`. For that the preconditioner `P` is projected, `P - P A (A^T P A)^-1 A^T P`, whose spectrum
 //!   with `H` lies within that of `P`: constraints cost no iterations. What is left of the residual corrects the multipliers.
 //! - Every trial is [restored](Restoring::restored) to `C = C*` by Newton's method for one or two numbers: displacements of the interface along its
-//!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter), which keep the profile. A perimeter
-//!   that is held alone is restored by the shorter one of both, since the second one sharpens edges.
+//!   normal that are constant (for the volume) and proportional to the mean curvature (for the perimeter; `kappa exp(-(eps kappa)^4)`, so that bends
+//!   that the interface does not resolve stay), which keep the profile. A perimeter that is held alone is restored by the shorter one of both,
+//!   since the second one sharpens edges. Where a correction takes off less than a quarter of what it should, the targets are out of reach: a
+//!   trial that long is dropped, and so is the minimization if only steps that gain next to nothing are left. Then a shorter time step is tried.
 
 use burn::tensor::Tensor;
-use geometry::zero_set::{SizeHessian, Sizes, least_perimeter, reduced_volume};
+use geometry::zero_set::{
+    SizeHessian, Sizes, ball_perimeter, ball_volume, least_perimeter, reduced_volume,
+};
 use geometry::{Field, Grid, Stored, positive};
 use operators::{
     ComputeDevice, HostUpdate, Real, SharedUpdate, inner_product, retract, update_on_host,
@@ -36,8 +40,16 @@ const CORRECTIONS: usize = 16;
 const LONGEST: f64 = 0.5;
 /// After shorter ones the derivatives of the measures are not computed again, in the same units.
 const NEAR: f64 = 0.02;
+/// Unless the violation falls by less than this factor.
+const FAST: f64 = 0.1;
+/// The least part of what a correction should take off the violation.
+const WORTHWHILE: f64 = 0.25;
+/// After a correction that takes off less the targets count as out of reach, if the violation is larger than this.
+const FAR: f64 = 1e-3;
 /// Gradients that differ by less than this part are the same constraint.
 const DEPENDENT: f64 = 1e-12;
+/// The least distance of two interfaces in units of `eps`; below about three, no stationary profile lies between them.
+const NEAREST: f64 = 2.0;
 /// Balls that are measured are round to this part of their perimeter.
 const SLACK: f64 = 1e-4;
 /// The measures in the order of [`Sizes`].
@@ -76,16 +88,34 @@ impl Constraints {
         [self.perimeter, self.volume]
     }
 
-    /// Refuses targets that no set in the periodic box has.
+    /// Refuses targets that no set in the periodic box has, or none with an interface of width `eps`.
     ///
     /// # Errors
     /// [`Error::Geometry`] for a target that is not positive and finite, [`Error::VolumeTooLarge`] for the volume of the whole box or more,
-    /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume.
-    pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
-        for (name, target) in NAMES.into_iter().zip(self.targets()) {
-            if let Some(value) = target {
-                positive(name, value)?;
+    /// [`Error::PerimeterTooSmall`] for a perimeter below the least that encloses the volume; [`Error::SizeTooSmall`] for a size below that of
+    /// the ball of radius `eps`, [`Error::PerimeterTooLarge`] for more than interfaces have that fill the box at distances of `2 eps`.
+    pub fn check<const D: usize>(&self, grid: &Grid<D>, eps: f64) -> Result<(), Error> {
+        let smallest = ball_volume(D, eps);
+        let least = [ball_perimeter(D, smallest), smallest];
+        for ((measure, target), least) in NAMES.into_iter().zip(self.targets()).zip(least) {
+            if let Some(target) = target
+                && positive(measure, target)? < least
+            {
+                return Err(Error::SizeTooSmall {
+                    measure,
+                    target,
+                    least,
+                    eps,
+                });
             }
+        }
+        let most = grid.side().powi(D as i32) / (NEAREST * eps);
+        if let Some(perimeter) = self.perimeter.filter(|perimeter| *perimeter > most) {
+            return Err(Error::PerimeterTooLarge {
+                perimeter,
+                most,
+                eps,
+            });
         }
         let Some(volume) = self.volume else {
             return Ok(());
@@ -230,6 +260,7 @@ impl<'a, const D: usize> Restoring<'a, D> {
         let exact = self.tolerance();
         let tolerance = if exactly { exact } else { exact.max(ITERATES) };
         let mut found: Option<Correction> = None;
+        let (mut before, mut wanted) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..CORRECTIONS {
             let Some(tangent) = self.tangent(&u)? else {
                 return Ok(None);
@@ -238,13 +269,27 @@ impl<'a, const D: usize> Restoring<'a, D> {
                 let tangent = Some(tangent);
                 return Ok(Some(Place { u, tangent }));
             }
-            let correction = found.unwrap_or_else(|| self.correction(&tangent));
-            let Some((motion, is_short)) = correction.motion(&tangent) else {
+            let violation = tangent.violation();
+            // Where holes come and go under a correction, it may lead farther away, and so do those after it.
+            if violation > wanted && violation > FAR {
+                return Ok(None);
+            }
+            // Near the targets the derivatives change little, but where holes come and go.
+            let serves = violation <= FAST * before;
+            before = violation;
+            let known = found.take().filter(|_| serves);
+            let correction = known.unwrap_or_else(|| self.correction(&tangent));
+            let Some(Motion {
+                values,
+                part,
+                is_short,
+            }) = correction.motion(&tangent)
+            else {
                 return Ok(None);
             };
-            // Near the targets the derivatives change little.
+            wanted = violation * (1.0 - WORTHWHILE * part);
             found = is_short.then_some(correction);
-            let motion = self.device.tensor(&motion, u.dims());
+            let motion = self.device.tensor(&values, u.dims());
             u = hold(retract(&u, &motion, 1.0));
         }
         Ok(None)
@@ -314,10 +359,10 @@ impl<'a, const D: usize> Restoring<'a, D> {
         let wells: Vec<f64> = tangent.u.iter().map(|u| (1.0 - u * u).max(0.0)).collect();
         let constant = || self.inside(wells.clone());
         let bent = || {
-            // Sharper bends than the interface is wide are corners.
-            let most = self.eps.recip();
+            // Sharper bends than the interface is wide are corners and narrow holes, which would move most: they would become sharper, or close.
+            let resolved = |k: f64| k * (-(self.eps * k).powi(4)).exp();
             let curvature = tangent.sizes.mean_curvature();
-            let bends = curvature.iter().map(|k| k.clamp(-most, most));
+            let bends = curvature.into_iter().map(resolved);
             self.inside(wells.iter().zip(bends).map(|(well, k)| well * k).collect())
         };
         if let ([part], [gradient]) = (&tangent.parts[..], gradients)
@@ -454,10 +499,17 @@ struct Correction {
     changes: [[f64; 2]; 2],
 }
 
+/// A motion towards the targets.
+struct Motion {
+    values: Vec<f64>,
+    /// The part of the way to first order that it goes; less than one where the whole would be too long.
+    part: f64,
+    is_short: bool,
+}
+
 impl Correction {
-    /// The motion to first order that restores the constraints, and whether it is short; none if they depend on each
-    /// other, or on nothing that may move.
-    fn motion<const D: usize>(&self, tangent: &Tangent<D>) -> Option<(Vec<f64>, bool)> {
+    /// The motion to first order that restores the constraints; none if they depend on each other, or on nothing that may move.
+    fn motion<const D: usize>(&self, tangent: &Tangent<D>) -> Option<Motion> {
         let parts = &tangent.parts;
         let factors = solve(
             parts.len(),
@@ -471,13 +523,21 @@ impl Correction {
             }
         }
         let longest = longest_displacement(&tangent.u, &motion);
-        let is_short = longest <= NEAR;
-        if longest > LONGEST {
+        let part = if longest > LONGEST {
+            LONGEST / longest
+        } else {
+            1.0
+        };
+        if part < 1.0 {
             for value in &mut motion {
-                *value *= LONGEST / longest;
+                *value *= part;
             }
         }
-        Some((motion, is_short))
+        Some(Motion {
+            values: motion,
+            part,
+            is_short: longest <= NEAR,
+        })
     }
 }
 

@@ -54,6 +54,21 @@ pub enum Error {
          area): hold one of the two sizes, or more surface for this volume (a smaller reduced volume)"
     )]
     LeastPerimeter { perimeter: f64, volume: f64 },
+    #[error(
+        "a {measure} of {target} is too small to hold: an interface of width {eps} needs a ball of this radius at least, and so {least}; give at \
+         least that, or more cells"
+    )]
+    SizeTooSmall {
+        measure: &'static str,
+        target: f64,
+        least: f64,
+        eps: f64,
+    },
+    #[error(
+        "a perimeter of {perimeter} does not fit the box: interfaces of width {eps} are at least two widths apart, which leaves room for {most}; \
+         give less than that, or more cells"
+    )]
+    PerimeterTooLarge { perimeter: f64, most: f64, eps: f64 },
     #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
     VolumeTooLarge { volume: f64, box_volume: f64 },
     #[error(

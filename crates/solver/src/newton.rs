@@ -4,6 +4,7 @@
 //! plain Newton-CG with Armijo's rule of the paper, kept for comparison.
 
 use std::cell::Cell;
+use std::ops::RangeInclusive;
 
 use burn::tensor::Tensor;
 use operators::{ComputeDevice, retract};
@@ -76,16 +77,35 @@ struct Point<const D: usize> {
     tangent: Option<Tangent<D>>,
 }
 
-/// The smallest estimate so far, and how many Newton steps ago it was half as small as before.
+/// A Newton step that lowers the energy by a smaller part of its slope gains next to nothing; one to the minimum of the quadratic model gains half.
+const POOR: f64 = 0.01;
+/// Parts of a Newton step that are tried on a straight line,
+const STRAIGHT: RangeInclusive<f64> = 1e-6..=1.0;
+/// and where sizes are held: where longer ones along the profile cannot be brought back to the targets, straight ones cannot, either.
+const STRAIGHT_HELD: RangeInclusive<f64> = POOR..=0.0625;
+
+/// How the Newton steps of a minimization that holds sizes get on.
 #[derive(Default)]
 struct Progress {
+    /// The smallest estimate so far,
     smallest: Option<f64>,
+    /// and how many Newton steps ago it was half as small as before.
     since: usize,
+    /// Where the last Newton step began.
+    last: Option<Outlook>,
+}
+
+/// The energy where a Newton step begins, and its slope along the direction there.
+#[derive(Clone, Copy)]
+struct Outlook {
+    energy: f64,
+    slope: f64,
 }
 
 impl Progress {
-    /// Whether for a while no estimate has been half of the smallest one.
-    fn has_stalled(&mut self, estimate: f64) -> bool {
+    /// Whether for a while no estimate has been half of the smallest one, or the last step was [poor](POOR): there the measures bend so
+    /// much that only the shortest steps can be brought back to their targets, and many of them would follow.
+    fn has_stalled(&mut self, estimate: f64, now: Outlook) -> bool {
         /// Newton steps; those that converge take fewer for a digit.
         const PATIENCE: usize = 10;
         if self
@@ -96,7 +116,9 @@ impl Progress {
         } else {
             self.since += 1;
         }
-        self.since >= PATIENCE
+        let is_poor = (self.last).is_some_and(|last| last.energy - now.energy < POOR * last.slope);
+        self.last = Some(now);
+        is_poor || self.since >= PATIENCE
     }
 }
 
@@ -363,7 +385,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let full = point.u.clone() - solution.direction.clone() * solution.slope.signum();
             let next = match self.trial(full)? {
                 Some(next) if next.energy < point.energy => next,
-                _ => match self.straight(&point, &solution, 0.5, 0.05, 0.0)? {
+                _ => match self.straight(&point, &solution, 0.05..=0.5, 0.0)? {
                     Some((place, _)) => self.point(place)?,
                     None => {
                         // The objective's own point is another by now.
@@ -381,17 +403,16 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         Ok(point)
     }
 
-    /// Backtracks from `longest` along the straight line until the energy falls by `sufficient * t * slope`.
+    /// Backtracks from the longest of these parts of a step along the straight line until the energy falls by `sufficient * t * slope`.
     fn straight(
         &mut self,
         point: &Point<D>,
         solution: &CgSolution<D>,
-        longest: f64,
-        shortest: f64,
+        parts: RangeInclusive<f64>,
         sufficient: f64,
     ) -> Result<Option<(Place<D>, f64)>, Error> {
-        let (mut t, sign) = (longest, -solution.slope.signum());
-        while t >= shortest {
+        let (mut t, sign) = (*parts.end(), -solution.slope.signum());
+        while t >= *parts.start() {
             let u = point.u.clone() + solution.direction.clone() * (sign * t);
             if let Some(place) = self.place(u)? {
                 let energy = self.energy(&place)?;
@@ -408,6 +429,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
         let mut point = self.better_start(start)?;
         let mut progress = Progress::default();
+        let parts = match self.held {
+            Some(_) => STRAIGHT_HELD,
+            None => STRAIGHT,
+        };
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;
             let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
@@ -430,12 +455,19 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 return Ok((exit, self.last_step(point, &solution, lost)?));
             }
             // Sizes that a step of this length cannot hold: a shorter one is tried instead.
-            if self.held.is_some() && progress.has_stalled(self.info.estimate) {
+            let outlook = Outlook {
+                energy: point.energy,
+                slope: decrease,
+            };
+            if self.held.is_some()
+                && !self.is_rounding(decrease, point.energy)
+                && progress.has_stalled(self.info.estimate, outlook)
+            {
                 break;
             }
             point = match self.along_the_profile(&point, &solution)? {
                 Some(next) => next,
-                None => match self.straight(&point, &solution, 1.0, 1e-6, 1e-4)? {
+                None => match self.straight(&point, &solution, parts.clone(), 1e-4)? {
                     Some((place, _)) => self.point(place)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);
@@ -515,9 +547,14 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         Ok(None)
     }
 
+    /// Whether an expected decrease drowns in rounding.
+    fn is_rounding(&self, decrease: f64, energy: f64) -> bool {
+        decrease <= self.noise(energy) * self.unknowns.sqrt()
+    }
+
     /// No step lowered the energy: either the expected decrease drowns in rounding, or the method failed.
     fn stuck(&self, decrease: f64, energy: f64) -> Exit {
-        if decrease <= self.noise(energy) * self.unknowns.sqrt() {
+        if self.is_rounding(decrease, energy) {
             Exit::Precision
         } else {
             Exit::IterationLimit
@@ -539,7 +576,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             let solution = self.solve(&point, limits, Level::Both)?;
             let done = self.converged(self.motion(&point)?, solution.slope);
             self.info.newton += 1;
-            let next = self.straight(&point, &solution, 1.0, 1e-6, 1e-4)?;
+            let next = self.straight(&point, &solution, STRAIGHT, 1e-4)?;
             point = match (done, next) {
                 (None, Some((place, _))) => self.point(place)?,
                 (Some(exit), Some((place, energy))) => return Ok((exit, (place.u, energy))),

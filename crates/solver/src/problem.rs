@@ -173,9 +173,10 @@ impl<const D: usize> Problem<D> {
     /// As [`Constraints::check`](crate::Constraints::check), for the targets and for those on the way to them.
     pub fn hold(&mut self, held: impl Into<Held>) -> Result<(), Error> {
         let held = held.into();
-        held.targets().check(&self.grid)?;
+        let eps = self.params.eps;
+        held.targets().check(&self.grid, eps)?;
         for step in 1..=held.steps() {
-            held.at(step as f64).check(&self.grid)?;
+            held.at(step as f64).check(&self.grid, eps)?;
         }
         self.held = held;
         Ok(())
