@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, KeptEdges, Mended};
+use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, KeptEdges, Mended, PlaceHasher};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -166,7 +166,8 @@ impl OwnMesh {
             changes,
             places,
         } = mended;
-        if self.noise.is_nan() {
+        let is_estimated = self.noise.is_nan();
+        if is_estimated {
             self.noise = open
                 .as_ref()
                 .map_or_else(|| closed.mesh().noise(), |open| open.noise);
@@ -179,7 +180,11 @@ impl OwnMesh {
         let lids = open
             .as_ref()
             .map_or(0, |open| closed.mesh().vertices.len() - open.vertices);
-        let fairing = Fairing::with_lids(closed, self.noise, stays, lids).with_edges(self.edges);
+        let mut fairing =
+            Fairing::with_lids(closed, self.noise, stays, lids).with_edges(self.edges);
+        if is_estimated {
+            fairing = fairing.with_found_noise(self.noise);
+        }
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
             return Err(Refusal::KeepsAll.into());
@@ -388,7 +393,8 @@ impl OwnMesh {
             edges = KeptEdges::default();
         }
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
-        let goes: HashMap<_, _> = (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
+        let goes: HashMap<_, _, PlaceHasher> =
+            (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
         let lengths: Vec<f64> = squares.map(f64::sqrt).collect();
         let Loaded {

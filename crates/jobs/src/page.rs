@@ -3,8 +3,6 @@
 //! It is made of the files of the run alone, and the same files give the same bytes. It is not one of them: the checkpoint
 //! does not know it, so that it may be removed, and is written again by `willmore resume`.
 
-use std::collections::BTreeSet;
-
 use engine::METRICS;
 use pages::{
     ImageElement, Markup, Page, Section, TableElement, View, figure, five_digits, frames, markdown,
@@ -285,7 +283,7 @@ fn before_and_after(
         [] => vec![],
     };
     let pictures = ends.par_iter().map(|(label, mesh)| {
-        let others = ends.iter().flat_map(|(_, other)| corners(other));
+        let others = ends.iter().flat_map(|(_, other)| other.corner_places());
         // The view to turn is what people look at.
         let scene = Scene::of_mesh(mesh.clone()).quality(Quality::Draft);
         let scene = scene.view(view).beside(others);
@@ -294,12 +292,4 @@ fn before_and_after(
         Ok(((*label).to_owned(), image))
     });
     pictures.collect()
-}
-
-/// The vertices that faces have.
-fn corners(mesh: &TriangleMesh) -> impl Iterator<Item = [f64; 3]> {
-    let corners: BTreeSet<u32> = mesh.faces.as_flattened().iter().copied().collect();
-    corners
-        .into_iter()
-        .map(|vertex| mesh.vertices[vertex as usize])
 }

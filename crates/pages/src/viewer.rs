@@ -1,6 +1,6 @@
 //! Surfaces to turn.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use geometry::measure::BoundingBox;
@@ -15,6 +15,8 @@ use crate::surface::Surface;
 
 /// Directions in which the outermost points are looked for.
 const DIRECTIONS: usize = 200;
+/// Cubes along the radius in which they are looked for.
+const CUBES: f64 = 8.0;
 
 /// Surfaces, such as the steps of a flow, of which one is shown and can be turned: one or more with a label each, all seen in one scale
 /// and from one direction, in which together they fill the view. Pictures with labels, side by side, stand in for them until they are started,
@@ -32,8 +34,7 @@ pub fn viewer<'a>(
     let (mut encoded, mut points) = (Vec::new(), Vec::new());
     for (label, mesh) in surfaces {
         encoded.push(Surface::new(label, mesh)?);
-        let corners: BTreeSet<u32> = mesh.faces.as_flattened().iter().copied().collect();
-        points.extend(corners.iter().map(|&vertex| mesh.vertices[vertex as usize]));
+        points.extend(mesh.corner_places());
     }
     let (centre, radius) = ball(&points);
     Ok(html! {
@@ -78,20 +79,66 @@ fn ball(points: &[[f64; 3]]) -> ([f64; 3], f64) {
 /// The points that are outermost in some direction, seen from the centre in units of the radius: what fits into the view from all sides if these
 /// do, up to a percent.
 fn outline(points: &[[f64; 3]], centre: [f64; 3], radius: f64) -> String {
+    let groups = groups(points, centre, radius);
     let outermost: BTreeSet<usize> = (0..DIRECTIONS)
-        .filter_map(|k| {
-            let direction = direction(k);
-            let far = |x: &[f64; 3]| (0..3).map(|i| direction[i] * x[i]).sum::<f64>();
-            let places = points.iter().map(far).enumerate();
-            let first = places.reduce(|a, b| if b.1 > a.1 { b } else { a });
-            Some(first?.0)
-        })
+        .filter_map(|k| outermost(points, &groups, direction(k)))
         .collect();
     let numbers = outermost
         .iter()
         .flat_map(|&k| (0..3).map(move |i| (points[k][i] - centre[i]) / radius));
     let numbers: Vec<String> = numbers.map(|number| format!("{number:.4}")).collect();
     numbers.join(" ")
+}
+
+/// Points that are near each other.
+struct Group {
+    bounds: BoundingBox<3>,
+    /// Their numbers, in ascending order.
+    points: Vec<usize>,
+}
+
+/// All points, in cubes into which that around the ball is divided.
+fn groups(points: &[[f64; 3]], centre: [f64; 3], radius: f64) -> Vec<Group> {
+    let mut cubes: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+    for (number, x) in points.iter().enumerate() {
+        let cube = [0, 1, 2].map(|i| (CUBES * (x[i] - centre[i]) / radius).floor() as i64);
+        cubes.entry(cube).or_default().push(number);
+    }
+    let group = |points_in: Vec<usize>| {
+        let places = points_in.iter().map(|&number| points[number]);
+        Some(Group {
+            bounds: BoundingBox::around(places)?,
+            points: points_in,
+        })
+    };
+    cubes.into_values().filter_map(group).collect()
+}
+
+/// The point that is farthest in a direction, of several the first one. Groups whose boxes end before another point are passed over.
+fn outermost(points: &[[f64; 3]], groups: &[Group], direction: [f64; 3]) -> Option<usize> {
+    let far = |x: [f64; 3]| (0..3).map(|i| direction[i] * x[i]).sum::<f64>();
+    let mut best: Option<(f64, usize)> = None;
+    for group in groups {
+        let BoundingBox { lower, upper } = group.bounds;
+        let end = [0, 1, 2].map(|i| {
+            if direction[i] < 0.0 {
+                lower[i]
+            } else {
+                upper[i]
+            }
+        });
+        if best.is_some_and(|(most, _)| far(end) < most) {
+            continue;
+        }
+        for &number in &group.points {
+            let here = far(points[number]);
+            let is_farther = |(most, first)| here > most || here >= most && number < first;
+            if best.is_none_or(is_farther) {
+                best = Some((here, number));
+            }
+        }
+    }
+    best.map(|(_, number)| number)
 }
 
 /// Directions that are spread evenly, along a spiral from pole to pole.
@@ -106,6 +153,26 @@ fn direction(k: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_outermost_points_are_those_of_all() {
+        let points: Vec<[f64; 3]> = (0..4000)
+            .map(|k| [0.371, 0.519, 0.783].map(|step: f64| (step * f64::from(k) * 1.7).fract()))
+            .collect();
+        let (centre, radius) = ball(&points);
+        let groups = groups(&points, centre, radius);
+        assert!(groups.len() > 100);
+        for k in 0..DIRECTIONS {
+            let direction = direction(k);
+            let far = |x: &[f64; 3]| (0..3).map(|i| direction[i] * x[i]).sum::<f64>();
+            let places = points.iter().map(far).enumerate();
+            let first = places.reduce(|a, b| if b.1 > a.1 { b } else { a });
+            assert_eq!(
+                outermost(&points, &groups, direction),
+                first.map(|(n, _)| n)
+            );
+        }
+    }
 
     #[test]
     fn the_ball_is_around_all_points() {

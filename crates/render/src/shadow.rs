@@ -5,17 +5,21 @@
 //! that the light leaves a body through, so that no body casts a shadow on its own lit side by
 //! rounding (L. Williams: Casting curved shadows on curved surfaces, 1978).
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::light::{Lights, all_around};
-use crate::model::Model;
+use crate::model::{Model, Vertex};
 use crate::raster::Triangle;
 
 /// Maps that are kept at a time.
 const AT_ONCE: usize = 16;
 /// Lookups start this far from the surface, in pixels of a map.
 const OFFSET: f64 = 0.75;
+/// Vertices in a cube of so many pixels of a map are one for it, where it does not tell most of them apart.
+const CLUSTER: f64 = 0.5;
 
 /// For every vertex the visible part of the key light and the arriving part of the surroundings'
 /// light, from 0 to 1, given the numbers of directions to look in and the pixels a side of a map.
@@ -25,10 +29,14 @@ pub(crate) fn arriving(
     [sky, key]: [usize; 2],
     map_side: usize,
 ) -> Vec<[f64; 2]> {
-    let places = || model.vertices.iter().map(|vertex| vertex.place);
+    // Vertices of no triangle are not seen.
+    let corners = || model.triangles.as_flattened().iter();
+    let places = || corners().map(|&vertex| model.vertices[vertex as usize].place);
     let low = places().fold(DVec3::INFINITY, DVec3::min);
     let high = places().fold(DVec3::NEG_INFINITY, DVec3::max);
     let (centre, radius) = (low.midpoint(high), 0.5 * low.distance(high));
+    let clusters = Clusters::of(model, CLUSTER * 2.0 * radius / map_side as f64);
+    let model = clusters.as_ref().map_or(model, |clusters| &clusters.model);
     let parts = |directions: &[DVec3], weight: &(dyn Fn(DVec3, DVec3) -> f64 + Sync)| {
         // Light that arrives, and that would without obstacles.
         let mut sums = vec![[0.0, 0.0]; model.vertices.len()];
@@ -58,10 +66,78 @@ pub(crate) fn arriving(
     let sky = parts(&all_around(sky), &|n, d| {
         n.dot(d).max(0.0) * lights.radiance(d)
     });
-    key.into_iter()
-        .zip(sky)
+    let arriving: Vec<[f64; 2]> = (key.into_iter().zip(sky))
         .map(|(key, open)| [key, open])
-        .collect()
+        .collect();
+    match &clusters {
+        Some(clusters) => clusters
+            .of_vertices
+            .iter()
+            .map(|&c| arriving[c as usize])
+            .collect(),
+        None => arriving,
+    }
+}
+
+/// Groups of vertices that are so near to each other that a map does not tell them apart.
+struct Clusters {
+    /// A vertex for each group, in the middle of them, and the triangles between different groups.
+    model: Model,
+    /// The group of each vertex.
+    of_vertices: Vec<u32>,
+}
+
+impl Clusters {
+    /// Those in a cube of this side that look to the same one of its six sides; none if they are more than half as many as the vertices.
+    fn of(model: &Model, side: f64) -> Option<Self> {
+        let mut known = HashMap::new();
+        let mut vertices: Vec<Vertex> = Vec::new();
+        let mut counts: Vec<f64> = Vec::new();
+        let mut of_vertices = Vec::with_capacity(model.vertices.len());
+        for &Vertex {
+            place,
+            normal,
+            colour,
+        } in &model.vertices
+        {
+            let cube = (place / side).floor().to_array().map(|v| v as i64);
+            let axis = normal.abs().max_position();
+            let cluster = *known
+                .entry((cube, axis, normal[axis] > 0.0, colour))
+                .or_insert_with(|| {
+                    counts.push(0.0);
+                    vertices.push(Vertex {
+                        place: DVec3::ZERO,
+                        normal: DVec3::ZERO,
+                        colour,
+                    });
+                    counts.len() - 1
+                });
+            counts[cluster] += 1.0;
+            vertices[cluster].place += place;
+            vertices[cluster].normal += normal;
+            if 2 * counts.len() > model.vertices.len() {
+                return None;
+            }
+            of_vertices.push(cluster as u32);
+        }
+        for (vertex, count) in vertices.iter_mut().zip(counts) {
+            vertex.place /= count;
+            vertex.normal = vertex.normal.normalize_or_zero();
+        }
+        let triangles = model.triangles.iter();
+        let triangles = triangles.map(|corners| corners.map(|v| of_vertices[v as usize]));
+        let triangles = triangles
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        Some(Self {
+            model: Model {
+                vertices,
+                triangles,
+            },
+            of_vertices,
+        })
+    }
 }
 
 /// What parallel rays see from one direction.
@@ -126,5 +202,67 @@ impl Map {
         let ([left, low], [s, t]) = ([x.floor(), y.floor()], [x - x.floor(), y - y.floor()]);
         let row = |y: f64| (1.0 - s) * passes(left, y) + s * passes(left + 1.0, y);
         (1.0 - t) * row(low) + t * row(low + 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::View;
+    use surfaces::TriangleMesh;
+
+    /// A ball on a floor, in so many steps.
+    fn scene(steps: u32) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
+        let patch = |mesh: &mut TriangleMesh, place: &dyn Fn(f64, f64) -> [f64; 3]| {
+            let first = mesh.vertices.len() as u32;
+            for i in 0..=steps {
+                for j in 0..=steps {
+                    let [s, t] = [i, j].map(|k| f64::from(k) / f64::from(steps));
+                    mesh.vertices.push(place(s, t));
+                }
+            }
+            for i in 0..steps {
+                for j in 0..steps {
+                    let a = first + i * (steps + 1) + j;
+                    let (b, c) = (a + steps + 1, a + steps + 2);
+                    mesh.faces.extend([[a, b, c], [a, c, a + 1]]);
+                }
+            }
+        };
+        patch(&mut mesh, &|s, t| [4.0 * s - 2.0, 4.0 * t - 2.0, -1.0]);
+        patch(&mut mesh, &|s, t| {
+            let (low, round) = (std::f64::consts::PI * (1.0 - s), std::f64::consts::TAU * t);
+            [low.sin() * round.cos(), low.sin() * round.sin(), low.cos()].map(|v| 0.6 * v)
+        });
+        mesh
+    }
+
+    #[test]
+    fn light_on_fine_meshes_is_that_on_coarser_ones() {
+        let lights = Lights::new(&View::default().orientation().unwrap());
+        let light = |steps: u32| {
+            let model = Model::new(&scene(steps));
+            let is_clustered = Clusters::of(&model, CLUSTER * 2.0 * 2.9 / 60.0).is_some();
+            (arriving(&model, &lights, [48, 8], 60), is_clustered)
+        };
+        let ((coarse, few), (fine, many)) = (light(40), light(320));
+        assert!(!few && many);
+        // Every eighth vertex along both sides of a patch is one of the coarse mesh.
+        let place = |k: usize, steps: usize, scale: usize| {
+            let side = steps + 1;
+            let (patch, rest) = (k / (side * side), k % (side * side));
+            let fine_side = steps * scale + 1;
+            patch * fine_side * fine_side + (rest / side * scale) * fine_side + rest % side * scale
+        };
+        let far = |part: usize| {
+            let differences =
+                (0..coarse.len()).map(|k| (coarse[k][part] - fine[place(k, 40, 8)][part]).abs());
+            differences.sum::<f64>() / coarse.len() as f64
+        };
+        // There is shade, and it is in the same places.
+        assert!(coarse.iter().filter(|[key, _]| *key < 0.5).count() > coarse.len() / 20);
+        let (key, sky) = (far(0), far(1));
+        assert!(key < 0.03 && sky < 0.03, "{key} {sky}");
     }
 }

@@ -241,10 +241,10 @@ pub(crate) fn has_no_area(mesh: &TriangleMesh) -> Result<(), Error> {
 /// Whether the corners of a face are on a line up to rounding.
 pub(crate) fn is_flat(mesh: &TriangleMesh, face: [u32; 3]) -> bool {
     let [a, b, c] = mesh.corners(face);
-    let edges = [b - a, c - b, a - c].map(Vector::length);
-    let longest = edges.into_iter().fold(0.0, f64::max);
+    let squares = [b - a, c - b, a - c].map(Vector::length_squared);
+    let longest = squares.into_iter().fold(0.0, f64::max);
     // The height over the longest edge, against the rounding of the cross product.
-    scaled_normal([a, b, c]).length() <= 4.0 * f64::EPSILON * longest * longest
+    scaled_normal([a, b, c]).length() <= 4.0 * f64::EPSILON * longest
 }
 
 /// Leaves out vertices without faces and returns how many there were.

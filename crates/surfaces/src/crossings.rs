@@ -1,5 +1,7 @@
 //! Faces that cross other faces.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use derive_more::Display;
 use rayon::prelude::*;
 
@@ -34,12 +36,23 @@ impl TriangleMesh {
     /// For each face, whether it crosses others, beyond what neighbours have in common.
     pub fn crossing_faces(&self) -> Vec<bool> {
         let near = Faces::of(self);
-        let crosses = |face| {
+        let crossed: Vec<_> = self.faces.iter().map(|_| AtomicBool::new(false)).collect();
+        // Each pair once, beginning with faces that are near each other.
+        near.order.par_iter().for_each(|&face| {
             near.any(face, |other| {
-                near.share_less_than_an_edge(face, other) && near.cross(face, other)
-            })
-        };
-        (0..self.faces.len()).into_par_iter().map(crosses).collect()
+                if face < other
+                    && near.share_less_than_an_edge(face, other)
+                    && near.touch(face, other)
+                    && near.cross(face, other)
+                {
+                    for crossed in [&crossed[face], &crossed[other]] {
+                        crossed.store(true, Ordering::Relaxed);
+                    }
+                }
+                false
+            });
+        });
+        crossed.into_iter().map(AtomicBool::into_inner).collect()
     }
 
     /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
@@ -208,6 +221,15 @@ impl<'a> Faces<'a> {
             .iter()
             .filter(|v| vertices.contains(v));
         shared.count() < 2
+    }
+
+    /// Whether the boxes around two faces have a point in common.
+    fn touch(&self, one: usize, other: usize) -> bool {
+        let [one, other] = [one, other].map(|face| {
+            let [a, b, c] = self.triangles[face];
+            [a.min(b).min(c), a.max(b).max(c)]
+        });
+        one[0].cmple(other[1]).all() && other[0].cmple(one[1]).all()
     }
 
     /// Whether both have a piece of the line in common in which their planes meet, and reach to both sides of the other one there.

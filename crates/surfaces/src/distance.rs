@@ -1,14 +1,14 @@
 //! The exact signed distance to a closed mesh.
 
 use std::cell::Cell;
-use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use geometry::{Bricks, Field, Grid, Nodes, PhaseField, SignedDistance, Stored, is_thin};
 use rayon::prelude::*;
 
-use crate::hierarchy::{Hierarchy, Nearest};
-use crate::mesh::{angle_weighted_normals, merge_coincident};
+use crate::hierarchy::{Hierarchy, Nearest, ROW, RowSearch};
+use crate::mesh::{angle, merge_coincident};
 use crate::triangle::Part;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error};
@@ -28,19 +28,16 @@ pub struct MeshDistance {
     faces: Vec<[u32; 3]>,
     /// The faces of the mesh that they are.
     order: Vec<usize>,
-    /// Sums of the unit normals of all faces there, weighted by their angles at vertices.
-    vertex_normals: Vec<Vector>,
-    edge_normals: HashMap<Edge, Vector>,
+    /// Where the triangles around each vertex begin, and the end of all. Where sheets touch in a vertex, they are those of all of them.
+    starts: Vec<u32>,
+    around: Vec<u32>,
     /// A power of two that makes the longest side of the bounding box about one: the scaling is
     /// exact, and products of coordinates neither overflow nor underflow.
     scale: f64,
 }
 
 /// Nodes along a side of the bricks for which it is asked first whether they are far away.
-const SIDE: usize = 8;
-
-/// Two vertices in ascending order.
-type Edge = [u32; 2];
+const SIDE: usize = ROW;
 
 impl MeshDistance {
     /// Builds the hierarchy.
@@ -48,7 +45,6 @@ impl MeshDistance {
         let exponent = mesh.bounding_box().longest_side().log2().floor();
         let scale = (-exponent).clamp(-1000.0, 1000.0).exp2();
         let mesh = mesh.mesh();
-        // Where sheets touch in a vertex, the pseudo-normal is the sum over all of them.
         let (first, index) = merge_coincident(&mesh.vertices);
         let vertices = first.iter().map(|&v| mesh.vertices[v]);
         let vertices: Vec<_> = vertices.map(|x| Vector::from_array(x) * scale).collect();
@@ -58,21 +54,14 @@ impl MeshDistance {
             .iter()
             .map(|f| f.map(|v| vertices[v as usize]))
             .collect();
-        let vertex_normals = angle_weighted_normals(&vertices, &faces);
-        let mut edge_normals = HashMap::with_capacity(3 * faces.len() / 2);
-        for (face, triangle) in faces.iter().zip(&triangles) {
-            let normal = scaled_normal(*triangle).normalize_or_zero();
-            for i in 0..3 {
-                *edge_normals.entry(edge(face, i)).or_default() += normal;
-            }
-        }
         let (hierarchy, order) = Hierarchy::new(&triangles);
+        let (starts, around) = around(vertices.len(), &faces, &order);
         Self {
             hierarchy,
             faces: order.iter().map(|&f| faces[f]).collect(),
             order,
-            vertex_normals,
-            edge_normals,
+            starts,
+            around,
             scale,
         }
     }
@@ -91,9 +80,11 @@ impl MeshDistance {
         let mut values = vec![0.0; grid.len()];
         let layers = values.par_chunks_mut(cells * cells).enumerate();
         layers.for_each(|(i, layer)| {
-            let mut start = None;
+            let mut near = [None; ROW];
             for (j, row) in layer.chunks_mut(cells).enumerate() {
-                start = self.sample_row(&grid, [i, j, 0], start, row);
+                for (piece, values) in row.chunks_mut(ROW).enumerate() {
+                    near = self.sample_row(&grid, [i, j, piece * ROW], near, values);
+                }
             }
             layer_done();
         });
@@ -152,10 +143,10 @@ impl MeshDistance {
         let part = bricks.places().len().div_ceil(grid.cells()).max(1) * bricks.volume();
         let parts = values.par_chunks_mut(part).enumerate();
         parts.for_each(|(number, values)| {
-            let mut start = None;
+            let mut near = [None; ROW];
             for (row, values) in values.chunks_mut(SIDE).enumerate() {
                 let cell = number * part + row * SIDE;
-                start = self.sample_row(&grid, bricks.multi_index(cell), start, values);
+                near = self.sample_row(&grid, bricks.multi_index(cell), near, values);
                 for value in values {
                     *value = value.clamp(-reach, reach);
                 }
@@ -168,24 +159,21 @@ impl MeshDistance {
         Ok(stored)
     }
 
-    /// The distances of nodes in a row from a place on, and the face nearest to the first of them.
+    /// The distances of a few nodes in a row from a place on, and the faces nearest to them. Faces that are not far from these speed up the search.
     fn sample_row(
         &self,
         grid: &Grid<3>,
         [i, j, first]: [usize; 3],
-        near_start: Option<usize>,
-        row: &mut [f64],
-    ) -> Option<usize> {
-        let [x, y] = [grid.coordinate(0, i), grid.coordinate(1, j)];
-        let (mut near, mut start) = (near_start, None);
-        for (k, value) in row.iter_mut().enumerate() {
-            let node = Vector::new(x, y, grid.coordinate(2, first + k));
-            (*value, near) = self.distance_near(node, near);
-            if k == 0 {
-                start = near;
-            }
+        near: [Option<usize>; ROW],
+        values: &mut [f64],
+    ) -> [Option<usize>; ROW] {
+        let at = |axis: usize, node: usize| self.scale * grid.coordinate(axis, node);
+        let z = std::array::from_fn(|k| at(2, first + k.min(values.len() - 1)));
+        let nearest = RowSearch::nearest(&self.hierarchy, [at(0, i), at(1, j)], z, near);
+        for (value, nearest) in values.iter_mut().zip(&nearest) {
+            *value = nearest.map_or(f64::NAN, |nearest| self.signed(&nearest));
         }
-        start
+        nearest.map(|nearest| nearest.map(|nearest| nearest.triangle))
     }
 
     /// The bricks of which not all is further away than `reach`, if they fit the grid.
@@ -261,31 +249,105 @@ impl MeshDistance {
         let x = x * self.scale;
         let guess = near.map(|face| self.hierarchy.project(x, face));
         match self.hierarchy.nearest(x, guess) {
-            Some(nearest) => {
-                let distance = nearest.squared_distance.sqrt() / self.scale;
-                let inside = nearest.offset.dot(self.pseudo_normal(&nearest)) < 0.0;
-                let signed = if inside { -distance } else { distance };
-                (signed, Some(nearest.triangle))
-            }
+            Some(nearest) => (self.signed(&nearest), Some(nearest.triangle)),
             None => (f64::NAN, None),
         }
     }
 
-    /// Points outwards at the nearest point; of any length.
+    /// The signed distance of a point from the nearest one.
+    fn signed(&self, nearest: &Nearest) -> f64 {
+        let distance = nearest.squared_distance.sqrt() / self.scale;
+        let is_inside = nearest.offset.dot(self.pseudo_normal(nearest)) < 0.0;
+        if is_inside { -distance } else { distance }
+    }
+
+    /// Points outwards at the nearest point, of any length: the sum of the unit normals of all triangles there, at a vertex weighted by their angles.
     fn pseudo_normal(&self, nearest: &Nearest) -> Vector {
         let face = &self.faces[nearest.triangle];
         match nearest.part {
-            Part::Corner(i) => self.vertex_normals[face[i] as usize],
-            Part::Edge(i) => self.edge_normals[&edge(face, i)],
+            Part::Corner(i) => self.sum_around(face[i], |triangle| {
+                let corner = self.corner(triangle, face[i])?;
+                Some(angle(&self.hierarchy.triangles[triangle], corner))
+            }),
+            Part::Edge(i) => self.sum_around(face[i], |triangle| {
+                self.corner(triangle, face[(i + 1) % 3]).map(|_| 1.0)
+            }),
             Part::Inside => scaled_normal(self.hierarchy.triangles[nearest.triangle]),
         }
     }
+
+    /// Which corner of a triangle a vertex is, if it is one.
+    fn corner(&self, triangle: usize, vertex: u32) -> Option<usize> {
+        self.faces[triangle].iter().position(|&v| v == vertex)
+    }
+
+    /// The sum of the unit normals around a vertex, of those triangles that have a weight.
+    fn sum_around(&self, vertex: u32, weight: impl Fn(usize) -> Option<f64>) -> Vector {
+        let vertex = vertex as usize;
+        let around = &self.around[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
+        let normals = around.iter().filter_map(|&triangle| {
+            let triangle = triangle as usize;
+            let normal = scaled_normal(self.hierarchy.triangles[triangle]).normalize_or_zero();
+            Some(normal * weight(triangle)?)
+        });
+        normals.sum()
+    }
+
+    /// The largest distance of points from the surface, of those that have a distance. `beside` has a vertex of the surface for each point, near which
+    /// it may be: what is no farther from that than another point from the surface is not looked for.
+    fn largest(&self, points: &[[f64; 3]], beside: Option<&[[f64; 3]]>) -> f64 {
+        let at = |x: &[f64; 3]| Vector::from_array(*x) * self.scale;
+        let bound = |point: usize| {
+            beside.map_or(f64::INFINITY, |beside| {
+                at(&points[point]).distance_squared(at(&beside[point]))
+            })
+        };
+        // Numbers that are not negative are in the order of their bits.
+        let largest = AtomicU64::new(0);
+        let look = |point: usize| {
+            let (x, known) = (
+                at(&points[point]),
+                f64::from_bits(largest.load(Ordering::Relaxed)),
+            );
+            if bound(point) <= known || self.hierarchy.is_within(x, known) {
+                return;
+            }
+            if let Some(nearest) = self.hierarchy.nearest(x, None) {
+                largest.fetch_max(nearest.squared_distance.to_bits(), Ordering::Relaxed);
+            }
+        };
+        let all = 0..points.len();
+        // One that has gone far spares most of the others.
+        if let Some(far) = all.clone().max_by(|a, b| bound(*a).total_cmp(&bound(*b))) {
+            look(far);
+        }
+        all.into_par_iter().for_each(look);
+        f64::from_bits(largest.into_inner()).sqrt() / self.scale
+    }
 }
 
-/// Edge `i` of a face, from corner `i` to the next.
-fn edge(face: &[u32; 3], i: usize) -> Edge {
-    let (a, b) = (face[i], face[(i + 1) % 3]);
-    [a.min(b), a.max(b)]
+/// For each vertex where its triangles begin, and the end of all, and these triangles: their places in an order, in the order of the faces.
+fn around(vertices: usize, faces: &[[u32; 3]], order: &[usize]) -> (Vec<u32>, Vec<u32>) {
+    let mut places = vec![0; faces.len()];
+    for (place, &face) in (0..).zip(order) {
+        places[face] = place;
+    }
+    let mut starts = vec![0; vertices + 1];
+    for &vertex in faces.as_flattened() {
+        starts[vertex as usize + 1] += 1;
+    }
+    for vertex in 1..starts.len() {
+        starts[vertex] += starts[vertex - 1];
+    }
+    let (mut next, mut around) = (starts.clone(), vec![0; 3 * faces.len()]);
+    for (face, place) in faces.iter().zip(places) {
+        for &vertex in face {
+            let next = &mut next[vertex as usize];
+            around[*next as usize] = place;
+            *next += 1;
+        }
+    }
+    (starts, around)
 }
 
 impl SignedDistance<3> for MeshDistance {
@@ -297,8 +359,10 @@ impl SignedDistance<3> for MeshDistance {
 /// The Hausdorff distance of two meshes at their vertices: how far the farthest vertex of one is from the faces of the other.
 pub fn hausdorff_distance(a: &ClosedMesh, b: &ClosedMesh) -> f64 {
     let farthest = |points: &ClosedMesh, from: &ClosedMesh| {
-        let distances = MeshDistance::new(from).signed_distances(&points.mesh().vertices);
-        distances.into_iter().map(f64::abs).fold(0.0, f64::max)
+        let [points, beside] = [points, from].map(|mesh| &*mesh.mesh().vertices);
+        // Two states of one mesh have their vertices in the same order.
+        let beside = (points.len() == beside.len()).then_some(beside);
+        MeshDistance::new(from).largest(points, beside)
     };
     farthest(a, b).max(farthest(b, a))
 }

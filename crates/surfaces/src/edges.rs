@@ -54,7 +54,43 @@ pub(crate) struct Sides<'a> {
     starts: Vec<usize>,
     faces: Vec<u32>,
     /// The faces around each face.
-    around: Vec<Vec<u32>>,
+    around: Rows<u32>,
+}
+
+/// Rows of numbers, one after the other.
+struct Rows<T> {
+    /// Where each row begins, and the end of all.
+    starts: Vec<usize>,
+    values: Vec<T>,
+}
+
+impl<T: Copy + Send> Rows<T> {
+    /// So many, of which `push` adds the numbers of each.
+    fn of(count: usize, push: &(dyn Fn(usize, &mut Vec<T>) + Sync)) -> Self {
+        let parts = parallel::map(count.div_ceil(CHUNK), 1, &|chunk| {
+            let (mut ends, mut values) = (Vec::with_capacity(CHUNK), Vec::new());
+            for row in chunk * CHUNK..count.min((chunk + 1) * CHUNK) {
+                push(row, &mut values);
+                ends.push(values.len());
+            }
+            (ends, values)
+        });
+        let mut rows = Self {
+            starts: Vec::with_capacity(count + 1),
+            values: Vec::with_capacity(parts.iter().map(|(_, values)| values.len()).sum()),
+        };
+        rows.starts.push(0);
+        for (ends, values) in parts {
+            let first = rows.values.len();
+            rows.starts.extend(ends.into_iter().map(|end| first + end));
+            rows.values.extend(values);
+        }
+        rows
+    }
+
+    fn of_row(&self, row: usize) -> &[T] {
+        &self.values[self.starts[row]..self.starts[row + 1]]
+    }
 }
 
 /// A smoothing with sharp edges.
@@ -80,15 +116,14 @@ impl<'a> Sides<'a> {
             faces[*place] = number / 3;
             *place += 1;
         }
-        let around = |face: usize| {
+        let around = Rows::of(triangles.len(), &|face, all| {
             let corners = triangles[face].iter().map(|&vertex| vertex as usize);
             let near = corners.flat_map(|v| &faces[starts[v]..starts[v + 1]]);
             let mut near: Vec<u32> = near.copied().filter(|&f| f as usize != face).collect();
             near.sort_unstable();
             near.dedup();
-            near
-        };
-        let around = parallel::map(triangles.len(), CHUNK, &around);
+            all.extend(near);
+        });
         Self {
             half_edges: HalfEdges::new(mesh.mesh()).expect("the mesh is closed"),
             umbrellas,
@@ -122,16 +157,16 @@ impl<'a> Sides<'a> {
             let squared = centres[face].distance_squared(centres[near as usize]);
             scaled[near as usize].length() * (-0.5 * squared / (range * range)).exp()
         };
-        let weights = parallel::map(centres.len(), CHUNK, &|face| {
-            let near = self.around[face].iter();
-            near.map(|&near| weight(face, near)).collect::<Vec<f64>>()
+        let weights = Rows::of(centres.len(), &|face, all| {
+            let near = self.around.of_row(face).iter();
+            all.extend(near.map(|&near| weight(face, near)));
         });
         let own: Vec<f64> = scaled.iter().map(|normal| normal.length()).collect();
         let mut normals: Vec<Vector> = scaled.iter().map(|n| n.normalize_or_zero()).collect();
         for _ in 0..NORMALS {
             normals = parallel::table(normals.len(), CHUNK, Vector::ZERO, &|face| {
                 let here = normals[face];
-                let pairs = self.around[face].iter().zip(&weights[face]);
+                let pairs = self.around.of_row(face).iter().zip(weights.of_row(face));
                 let sum = pairs.map(|(&near, weight)| {
                     let there = normals[near as usize];
                     let squared = here.distance_squared(there);

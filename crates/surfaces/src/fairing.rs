@@ -1,6 +1,7 @@
 //! A noisy mesh, and what becomes of its vertices while a phase field flows.
 
 use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
 
 use geometry::{PhaseField, Placement, distances_from_phase_field};
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use crate::level_set::project;
 use crate::selection::Noisy;
 use crate::smoothing::{TAUBIN, Umbrellas};
 use crate::vector::Vector;
-use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh};
+use crate::{ClosedMesh, Error, MeshDistance, PlaceHasher, TriangleMesh};
 
 /// Most rounds of Taubin's smoothing before the flow.
 const ROUNDS: usize = 30;
@@ -71,6 +72,10 @@ pub struct Fairing {
     pub edges: Edges,
     /// Rounds of Taubin's smoothing from the rough mesh to the start.
     rounds: usize,
+    /// Those of all meshes with these faces.
+    umbrellas: Arc<Umbrellas>,
+    /// The noise that is found in the mesh, once it is asked for.
+    found: OnceLock<f64>,
 }
 
 /// A mesh without its noise.
@@ -122,7 +127,8 @@ impl Fairing {
         let kept: Vec<bool> = (vertices.iter().enumerate())
             .map(|(vertex, &x)| vertex >= surface || kept(x))
             .collect();
-        let (start, rounds) = without_short_waves(&rough, noise, &kept, surface);
+        let umbrellas = Arc::new(Umbrellas::of(rough.mesh()));
+        let (start, rounds) = without_short_waves(&rough, &umbrellas, noise, &kept, surface);
         Self {
             start,
             noise,
@@ -131,6 +137,17 @@ impl Fairing {
             lids,
             edges: Edges::default(),
             rounds,
+            umbrellas,
+            found: OnceLock::new(),
+        }
+    }
+
+    /// The same where it is known which noise [is found](TriangleMesh::noise) in the surface without its lids.
+    #[must_use]
+    pub fn with_found_noise(self, found: f64) -> Self {
+        Self {
+            found: found.into(),
+            ..self
         }
     }
 
@@ -148,7 +165,8 @@ impl Fairing {
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
     pub fn time(&self, spacing: f64, scale: f64) -> f64 {
         let edge = scale * self.rough.mesh().mean_edge();
-        let found = self.rough.mesh().noise_of_first(self.surface());
+        let find = || self.rough.mesh().noise_of_first(self.surface());
+        let found = *self.found.get_or_init(find);
         let is_beyond = self.noise > BEYOND * found;
         let most = if is_beyond { TIME_BEYOND } else { TIME };
         most * (scale * self.noise).powi(2) * (edge * edge + spacing * spacing)
@@ -221,8 +239,8 @@ impl Fairing {
     pub fn displacement(&self, followed: &Followed, u: &impl PhaseField<3>) -> Result<f64, Error> {
         let now = self.flowed(followed, u)?;
         let start = self.start.mesh();
-        let displacements = along_normals(start, self.rough.mesh(), &now);
-        let averaged = start.averaged(&displacements);
+        let displacements = along_normals(&start.vertex_normals(), self.rough.mesh(), &now);
+        let averaged = self.umbrellas.averaged(&displacements);
         Ok(root_mean_square(&averaged[..self.surface()]))
     }
 
@@ -247,6 +265,7 @@ impl Fairing {
             noise: self.noise,
             counts: &counts,
             rounds: self.rounds,
+            umbrellas: &self.umbrellas,
         };
         let (mesh, edges) = noisy.nearest(&flowed, self.edges);
         let mesh = self.held(mesh);
@@ -265,7 +284,7 @@ impl Fairing {
         };
         if self.noise > 0.0 {
             let wavelength = LONG * followed.eps / followed.placement.scale();
-            mesh = mesh.with_long_waves_of(self.start.mesh(), wavelength);
+            mesh = mesh.with_long_waves_by(&self.umbrellas, self.start.mesh(), wavelength);
         }
         Ok(self.held(mesh))
     }
@@ -301,18 +320,21 @@ impl Followed {
 /// where it would make edges alike, by no more than noise does; those that are kept stay. And how many rounds these are.
 fn without_short_waves(
     rough: &ClosedMesh,
+    umbrellas: &Umbrellas,
     noise: f64,
     kept: &[bool],
     surface: usize,
 ) -> (ClosedMesh, usize) {
     let (mut smooth, mut rounds) = (rough.clone(), 0);
-    // Rounds move vertices and leave their neighbours.
-    let umbrellas = Umbrellas::of(rough.mesh());
     for _ in 0..ROUNDS {
-        let mut next = smooth.mesh().smoothed_by(&umbrellas, 1, TAUBIN);
-        hold_along_surface(&mut next, rough.mesh(), SLIDING * noise);
-        hold(&mut next, rough.mesh(), kept);
-        let moved = along_normals(&next, rough.mesh(), &next);
+        let mut next = smooth.mesh().smoothed_by(umbrellas, 1, TAUBIN);
+        let mut normals = next.vertex_normals();
+        let longest = SLIDING * noise;
+        let are_held = hold_along_surface(&mut next, &normals, rough.mesh(), longest);
+        if are_held | hold(&mut next, rough.mesh(), kept) {
+            normals = next.vertex_normals();
+        }
+        let moved = along_normals(&normals, rough.mesh(), &next);
         let moved = root_mean_square(&moved[..surface]);
         if moved.is_nan() || moved > SMOOTHED * noise {
             break;
@@ -344,7 +366,8 @@ struct Groups {
 impl Groups {
     /// Those in a cube of this side that look to the same one of its six sides.
     fn in_cubes(mesh: &TriangleMesh, side: f64) -> Self {
-        let (mut places, mut first) = (HashMap::new(), Vec::new());
+        let mut places = HashMap::with_hasher(PlaceHasher::default());
+        let mut first = Vec::new();
         let of_face = |(number, &face): (usize, &[u32; 3])| -> usize {
             let cube = centre(mesh, face).map(|x| (x / side).floor() as i64);
             let normal = Vector::from_array(mesh.face_normal(face));
@@ -360,29 +383,38 @@ impl Groups {
     }
 }
 
-/// Puts the vertices that are kept where those of a rough mesh are.
-fn hold(mesh: &mut TriangleMesh, rough: &TriangleMesh, kept: &[bool]) {
+/// Puts the vertices that are kept where those of a rough mesh are, if there are some.
+fn hold(mesh: &mut TriangleMesh, rough: &TriangleMesh, kept: &[bool]) -> bool {
     let vertices = mesh.vertices.iter_mut().zip(&rough.vertices).zip(kept);
     for ((x, from), _) in vertices.filter(|(_, kept)| **kept) {
         *x = *from;
     }
+    kept.contains(&true)
 }
 
-/// Shortens the ways of the vertices from those of a rough mesh along the surface to a length.
-fn hold_along_surface(mesh: &mut TriangleMesh, rough: &TriangleMesh, longest: f64) {
-    let normals = mesh.vertex_normals();
+/// Shortens the ways of the vertices from those of a rough mesh along the surface to a length, and says whether some were longer.
+fn hold_along_surface(
+    mesh: &mut TriangleMesh,
+    normals: &[[f64; 3]],
+    rough: &TriangleMesh,
+    longest: f64,
+) -> bool {
+    let mut any = false;
     for ((x, from), normal) in mesh.vertices.iter_mut().zip(&rough.vertices).zip(normals) {
         let here = Vector::from_array(*x);
         let way = here - Vector::from_array(*from);
-        let along = way.reject_from_normalized(normal.into());
-        *x = (here - along + along.clamp_length_max(longest)).to_array();
+        let along = way.reject_from_normalized(Vector::from_array(*normal));
+        if along.length_squared() > longest * longest {
+            *x = (here - along + along.clamp_length_max(longest)).to_array();
+            any = true;
+        }
     }
+    any
 }
 
-/// The displacements from the vertices of one mesh to those of another along the normals of a smooth one.
-fn along_normals(smooth: &TriangleMesh, from: &TriangleMesh, to: &TriangleMesh) -> Vec<f64> {
-    let normals = smooth.vertex_normals();
-    let pairs = from.vertices.iter().zip(&to.vertices).zip(&normals);
+/// The displacements from the vertices of one mesh to those of another along these normals.
+fn along_normals(normals: &[[f64; 3]], from: &TriangleMesh, to: &TriangleMesh) -> Vec<f64> {
+    let pairs = from.vertices.iter().zip(&to.vertices).zip(normals);
     pairs
         .map(|((a, b), n)| (0..3).map(|i| (b[i] - a[i]) * n[i]).sum())
         .collect()

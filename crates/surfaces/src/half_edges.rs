@@ -1,7 +1,5 @@
 //! How the triangles of a closed surface hang together, and operations that keep its topology.
 
-use rayon::prelude::*;
-
 use crate::{Error, TriangleMesh};
 
 /// What is no longer there.
@@ -61,8 +59,7 @@ impl HalfEdges {
                 upwards: from < to,
             }
         };
-        let mut sides: Vec<Side> = (0..surface.len()).map(side).collect();
-        sides.par_sort_unstable();
+        let sides = sorted(mesh.vertices.len(), surface.len(), side);
         check_edges(mesh, &sides)?;
         for h in 0..surface.len() {
             surface.start(h, surface.from(h));
@@ -256,6 +253,36 @@ impl Side {
     fn face(self) -> u32 {
         self.start / 3
     }
+}
+
+/// Sides in order, so many with vertices below this number. The few at a vertex are sorted after all have found their vertex.
+fn sorted(vertices: usize, count: u32, side: impl Fn(u32) -> Side) -> Vec<Side> {
+    let all = || (0..count).map(&side);
+    let mut ends = vec![0; vertices];
+    all().for_each(|side| ends[side.low as usize] += 1);
+    let mut end = 0;
+    for count in &mut ends {
+        // Its sides are written from here on.
+        end += std::mem::replace(count, end);
+    }
+    let none = Side {
+        low: NONE,
+        high: NONE,
+        start: NONE,
+        upwards: false,
+    };
+    let mut sides = vec![none; count as usize];
+    for side in all() {
+        let place = &mut ends[side.low as usize];
+        sides[*place] = side;
+        *place += 1;
+    }
+    let mut first = 0;
+    for end in ends {
+        sides[first..end].sort_unstable();
+        first = end;
+    }
+    sides
 }
 
 /// Every edge must have one side in each direction.

@@ -102,7 +102,7 @@ pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use label_mesh::{BACKGROUND, DepthDifference, LabelLattice, LabelMesh};
 pub use lids::Lids;
 pub use mending::{Covered, Mended};
-pub use mesh::TriangleMesh;
+pub use mesh::{PlaceHasher, TriangleMesh};
 pub use parts::Parts;
 pub use read::error::FormatError;
 pub use read::{decode, is_binary_stl, read, rewrite, vertex_colours};

@@ -1,6 +1,7 @@
 //! Lists of triangles.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use chacha20::ChaCha8Rng;
 use geometry::measure::BoundingBox;
@@ -32,6 +33,16 @@ impl TriangleMesh {
     pub(crate) fn points(&self) -> Vec<Vector> {
         let vertices = self.vertices.iter();
         vertices.map(|&x| Vector::from_array(x)).collect()
+    }
+
+    /// The places of the vertices that faces have, in the order of the vertices.
+    pub fn corner_places(&self) -> impl Iterator<Item = [f64; 3]> {
+        let mut is_corner = vec![false; self.vertices.len()];
+        for &vertex in self.faces.as_flattened() {
+            is_corner[vertex as usize] = true;
+        }
+        let all = self.vertices.iter().zip(is_corner);
+        all.filter(|(_, is_corner)| *is_corner).map(|(x, _)| *x)
     }
 
     /// Corners of a face.
@@ -195,9 +206,34 @@ pub(crate) fn key(x: [f64; 3]) -> [u64; 3] {
     x.map(|v| (v + 0.0).to_bits())
 }
 
+/// Hashes the bits of coordinates, several times as fast as the hasher of the standard library.
+pub type PlaceHasher = BuildHasherDefault<Mixed>;
+
+/// The bits that were hashed, mixed by multiplications.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mixed(u64);
+
+impl Hasher for Mixed {
+    fn write(&mut self, bytes: &[u8]) {
+        // The odd number next to 2^64 over the golden ratio.
+        const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+        for part in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..part.len()].copy_from_slice(part);
+            let mixed = self.0.rotate_left(29) ^ u64::from_le_bytes(word);
+            self.0 = mixed.wrapping_mul(FACTOR);
+        }
+    }
+
+    fn finish(&self) -> u64 {
+        // A product's low bits are those of the factors alone.
+        self.0 ^ (self.0 >> 32)
+    }
+}
+
 /// For every distinct position (`-0` equals `0`) the first vertex there, and for every vertex the number of its position.
 pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) {
-    let mut known = HashMap::with_capacity(vertices.len());
+    let mut known = HashMap::with_capacity_and_hasher(vertices.len(), PlaceHasher::default());
     let mut first = Vec::new();
     let index = vertices.iter().enumerate().map(|(vertex, x)| {
         *known.entry(key(*x)).or_insert_with(|| {
@@ -209,23 +245,33 @@ pub(crate) fn merge_coincident(vertices: &[[f64; 3]]) -> (Vec<usize>, Vec<u32>) 
     (first, index)
 }
 
+/// The angle of a triangle at a corner.
+pub(crate) fn angle(triangle: &[Vector; 3], corner: usize) -> f64 {
+    let [here, next, last] = [corner, corner + 1, corner + 2].map(|i| triangle[i % 3]);
+    let (a, b) = (next - here, last - here);
+    // That of the system's library takes several times as long.
+    libm::atan2(a.cross(b).length(), a.dot(b))
+}
+
+/// Faces whose normals are kept at a time, in the cache.
+const AT_ONCE: usize = 1 << 14;
+
 /// For every vertex the sum of the unit normals of its faces, weighted by their angles there.
 pub(crate) fn angle_weighted_normals(vertices: &[Vector], faces: &[[u32; 3]]) -> Vec<Vector> {
     let at_corners = |face: &[u32; 3]| {
         let triangle = face.map(|v| vertices[v as usize]);
         let normal = scaled_normal(triangle).normalize_or_zero();
-        [0, 1, 2].map(|i| {
-            let [here, next, last] = [i, i + 1, i + 2].map(|i| triangle[i % 3]);
-            let (a, b) = (next - here, last - here);
-            normal * a.cross(b).length().atan2(a.dot(b))
-        })
+        [0, 1, 2].map(|i| normal * angle(&triangle, i))
     };
-    let weighted: Vec<_> = faces.par_iter().map(at_corners).collect();
-    // One after the other, so that sums do not depend on the threads.
     let mut normals = vec![Vector::ZERO; vertices.len()];
-    for (face, at_corners) in faces.iter().zip(weighted) {
-        for (&vertex, normal) in face.iter().zip(at_corners) {
-            normals[vertex as usize] += normal;
+    let mut weighted = Vec::new();
+    for faces in faces.chunks(AT_ONCE) {
+        (faces.par_iter().map(at_corners)).collect_into_vec(&mut weighted);
+        // One after the other, so that sums do not depend on the threads.
+        for (face, at_corners) in faces.iter().zip(&weighted) {
+            for (&vertex, normal) in face.iter().zip(at_corners) {
+                normals[vertex as usize] += normal;
+            }
         }
     }
     normals

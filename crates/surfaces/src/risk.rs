@@ -1,15 +1,71 @@
 //! Which of several smoothings of a noisy mesh is nearest to the mesh without noise.
 
+use std::collections::BTreeMap;
+use std::ops::{Add, Div, Mul, Sub};
+
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use crate::TriangleMesh;
-use crate::smoothing::{TAUBIN, Umbrellas};
+use crate::smoothing::{Smoothed, TAUBIN, Umbrellas};
 use crate::vector::Vector;
 
 /// Fields of random signs by which degrees of freedom are estimated.
 const PROBES: usize = 8;
 const SEED: u64 = 1;
+
+/// The values of all fields of signs, or of what becomes of them, at a vertex: neighbours are looked up once for all of them.
+#[derive(Clone, Copy, Default)]
+struct Probes([f64; PROBES]);
+
+impl Probes {
+    fn with(self, other: Self, combined: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|k| combined(self.0[k], other.0[k])))
+    }
+
+    fn mean_product(self, other: Self) -> f64 {
+        let products = self
+            .0
+            .iter()
+            .zip(other.0)
+            .map(|(a, b)| a * b / PROBES as f64);
+        products.sum()
+    }
+}
+
+impl Add for Probes {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Probes {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl Mul<f64> for Probes {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self(self.0.map(|value| value * factor))
+    }
+}
+
+impl Div<f64> for Probes {
+    type Output = Self;
+
+    fn div(self, divisor: f64) -> Self {
+        Self(self.0.map(|value| value / divisor))
+    }
+}
+
+impl Smoothed for Probes {}
 
 /// A noisy mesh, by which smoothings of it are judged.
 ///
@@ -58,17 +114,29 @@ impl<'a> Judge<'a> {
             .collect()
     }
 
-    /// The degrees of freedom that so many rounds of Taubin's smoothing leave to each vertex.
-    pub(crate) fn freedom_of_taubin(&self, rounds: usize) -> Vec<f64> {
-        let mut sum = vec![0.0; self.normals.len()];
-        for probe in self.probes() {
-            let mut response = probe.clone();
-            self.umbrellas.smooth(&mut response, rounds, TAUBIN);
-            for ((sum, response), probe) in sum.iter_mut().zip(response).zip(probe) {
-                *sum += response * probe / PROBES as f64;
+    /// The degrees of freedom that numbers of rounds of Taubin's smoothing leave to each vertex, by these numbers.
+    pub(crate) fn freedoms_of_taubin(
+        &self,
+        rounds: impl IntoIterator<Item = usize>,
+    ) -> BTreeMap<usize, Vec<f64>> {
+        let mut freedoms: BTreeMap<_, _> = rounds.into_iter().map(|r| (r, Vec::new())).collect();
+        let mut probes = vec![Probes::default(); self.normals.len()];
+        for (number, probe) in self.probes().enumerate() {
+            for (probes, sign) in probes.iter_mut().zip(probe) {
+                probes.0[number] = sign;
             }
         }
-        sum
+        let (mut responses, mut done) = (probes.clone(), 0);
+        for (&rounds, freedom) in &mut freedoms {
+            // The rounds go on from those before.
+            self.umbrellas.smooth(&mut responses, rounds - done, TAUBIN);
+            done = rounds;
+            let pairs = responses.iter().zip(&probes);
+            *freedom = pairs
+                .map(|(response, probe)| response.mean_product(*probe))
+                .collect();
+        }
+        freedoms
     }
 
     /// Those that a smoothing leaves which makes `smoothed` of the rough mesh. One field of signs is enough for means over many vertices.

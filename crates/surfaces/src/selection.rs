@@ -1,5 +1,7 @@
 //! What the flow makes of a noisy mesh, beside what smooths less and what keeps edges.
 
+use std::collections::BTreeMap;
+
 use crate::edges::{Edges, KeptEdges, Sharpened, Sides};
 use crate::risk::Judge;
 use crate::smoothing::{TAUBIN, Umbrellas};
@@ -36,6 +38,7 @@ pub(crate) struct Noisy<'a> {
     pub(crate) counts: &'a [bool],
     /// Rounds of Taubin's smoothing before the flow.
     pub(crate) rounds: usize,
+    pub(crate) umbrellas: &'a Umbrellas,
 }
 
 /// How much is gained at each vertex if another smoothing takes the place of the flow: the difference of their risks, in units of the variance of the noise.
@@ -44,6 +47,8 @@ struct Gains<'a> {
     judge: Judge<'a>,
     /// The risk of the flow, but for a constant.
     of_flow: Vec<f64>,
+    /// The degrees of freedom that less smoothing leaves, by its rounds.
+    freedoms: BTreeMap<usize, Vec<f64>>,
 }
 
 /// A mesh that takes the place of another one, and which part it has at each vertex.
@@ -53,15 +58,17 @@ struct Selected {
 }
 
 impl<'a> Gains<'a> {
-    fn new(noisy: &'a Noisy<'a>, umbrellas: &'a Umbrellas, flowed: &TriangleMesh) -> Self {
-        let judge = Judge::new(noisy.rough.mesh(), umbrellas, flowed, noisy.noise);
-        let freedom = judge.averaged(judge.freedom_of_taubin(noisy.rounds), LOCAL);
+    fn new(noisy: &'a Noisy<'a>, flowed: &TriangleMesh) -> Self {
+        let judge = Judge::new(noisy.rough.mesh(), noisy.umbrellas, flowed, noisy.noise);
+        let freedoms = judge.freedoms_of_taubin(LESS.into_iter().chain([noisy.rounds]));
+        let freedom = judge.averaged(freedoms[&noisy.rounds].clone(), LOCAL);
         let residuals = judge.squared_residuals(flowed).into_iter();
         let of_flow = residuals.zip(freedom).map(|(r, df)| r + 2.0 * FREEDOM * df);
         Self {
             noisy,
             of_flow: of_flow.collect(),
             judge,
+            freedoms,
         }
     }
 
@@ -76,13 +83,17 @@ impl<'a> Gains<'a> {
     }
 
     /// The flow, and less smoothing where that is nearer: where the shape has details that are as small as the edges.
-    fn with_less(&self, umbrellas: &Umbrellas, flowed: &TriangleMesh) -> Selected {
+    fn with_less(&self, flowed: &TriangleMesh) -> Selected {
         let rough = self.noisy.rough.mesh();
+        let (mut points, mut done) = (rough.points(), 0);
         let mut best = vec![f64::NEG_INFINITY; flowed.vertices.len()];
         let mut less = flowed.clone();
         for rounds in LESS {
-            let smoothed = rough.smoothed_by(umbrellas, rounds, TAUBIN);
-            let gains = self.of(&smoothed, &self.judge.freedom_of_taubin(rounds));
+            // The rounds go on from those before.
+            (self.noisy.umbrellas).smooth(&mut points, rounds - done, TAUBIN);
+            done = rounds;
+            let smoothed = rough.on(&points);
+            let gains = self.of(&smoothed, &self.freedoms[&rounds]);
             let gains = self.judge.averaged(gains, LOCAL).into_iter().enumerate();
             for (vertex, gain) in gains
                 .filter(|(vertex, gain)| *gain > best[*vertex])
@@ -189,12 +200,11 @@ impl<'a> Gains<'a> {
 impl Noisy<'_> {
     /// What the flow has made of it, but with less smoothing or sharp edges where those are nearer to the mesh without noise.
     pub(crate) fn nearest(&self, flowed: &TriangleMesh, edges: Edges) -> (TriangleMesh, KeptEdges) {
-        let umbrellas = Umbrellas::of(self.rough.mesh());
-        let gains = Gains::new(self, &umbrellas, flowed);
-        let selected = gains.with_less(&umbrellas, flowed);
+        let gains = Gains::new(self, flowed);
+        let selected = gains.with_less(flowed);
         match edges {
             Edges::Round => (selected.mesh, KeptEdges::default()),
-            _ => gains.with_edges(&Sides::of(self.rough, &umbrellas), selected, edges),
+            _ => gains.with_edges(&Sides::of(self.rough, self.umbrellas), selected, edges),
         }
     }
 }

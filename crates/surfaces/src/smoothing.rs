@@ -1,5 +1,6 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
+use std::f64::consts::PI;
 use std::ops::{Add, Div, Mul, Sub};
 
 use geometry::parallel;
@@ -20,7 +21,13 @@ const FACTORS: [f64; 2] = [0.5, -0.47];
 /// Vertices are worked on in pieces of this many.
 pub(crate) const CHUNK: usize = 1 << 12;
 
+/// Terms of a series that add up to less than this part of what is smoothed are left out.
+const NEGLIGIBLE: f64 = 1e-12;
+/// A volume is reached when it is wrong by less than this part, which is some of its rounding.
+const REACHED: f64 = 1e-13;
+
 /// The neighbours of every vertex along edges, in ascending order.
+#[derive(Debug)]
 pub(crate) struct Umbrellas {
     /// Where those of each vertex begin, and the end of all.
     starts: Vec<usize>,
@@ -82,14 +89,19 @@ impl Umbrellas {
         &self.neighbours[self.starts[vertex]..self.starts[vertex + 1]]
     }
 
-    /// `L x = x - (mean of the neighbours)` at a vertex; zero where there are none.
-    fn laplacian_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
+    /// `M x`, the mean of the neighbours, at a vertex; its own value where there are none.
+    fn mean_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
         let around = self.around(vertex);
         if around.is_empty() {
-            return T::default();
+            return x[vertex];
         }
         let near = around.iter().map(|&n| x[n as usize]);
-        x[vertex] - near.fold(T::default(), T::add) / around.len() as f64
+        near.fold(T::default(), T::add) / around.len() as f64
+    }
+
+    /// `L x = x - M x` at a vertex.
+    fn laplacian_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
+        x[vertex] - self.mean_at(x, vertex)
     }
 
     fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
@@ -113,22 +125,115 @@ impl Umbrellas {
         }
     }
 
+    /// A number at each vertex, averaged over its neighbours: waves of some ten edges and more stay, and of independent noise 0.36 of its
+    /// standard deviation.
+    pub(crate) fn averaged(&self, numbers: &[f64]) -> Vec<f64> {
+        const ROUNDS: usize = 8;
+        let mut x = numbers.to_vec();
+        self.smooth(&mut x, ROUNDS, FACTORS);
+        x
+    }
+
+    /// What [`Self::smooth`] makes of a field in many rounds, up to [`NEGLIGIBLE`], in a number of passes that is as the root of theirs: the
+    /// [`Series`] of its polynomial of the mean, summed by Clenshaw's recurrence.
+    fn smooth_much<T: Smoothed>(&self, x: &[T], rounds: usize, factors: [f64; 2]) -> Vec<T> {
+        let Series(coefficients) = Series::of_taubin(rounds, factors);
+        let zero = || vec![T::default(); x.len()];
+        let (mut last, mut before) = (zero(), zero());
+        for (order, coefficient) in coefficients.into_iter().enumerate().rev() {
+            let factor = if order == 0 { 1.0 } else { 2.0 };
+            parallel::over_chunks(&mut before, CHUNK, &|first, part| {
+                for (next, vertex) in part.iter_mut().zip(first..) {
+                    *next = x[vertex] * coefficient + self.mean_at(&last, vertex) * factor - *next;
+                }
+            });
+            std::mem::swap(&mut last, &mut before);
+        }
+        last
+    }
+
     /// Sum of the squares of the coefficients of `L L x` at a vertex.
-    fn squared_weights(&self, vertex: usize, weights: &mut Vec<(u32, f64)>) -> f64 {
-        weights.clear();
-        weights.push((vertex as u32, 1.0));
+    fn squared_weights(&self, vertex: usize, weights: &mut Weights) -> f64 {
+        weights.add(vertex as u32, 1.0);
         let around = self.around(vertex);
         let share = 1.0 / around.len() as f64;
         for &near in around {
-            weights.push((near, -2.0 * share));
+            weights.add(near, -2.0 * share);
             let next = self.around(near as usize);
             let part = share / next.len() as f64;
-            weights.extend(next.iter().map(|&far| (far, part)));
+            for &far in next {
+                weights.add(far, part);
+            }
         }
-        weights.sort_unstable_by_key(|(vertex, _)| *vertex);
-        let groups = weights.chunk_by(|a, b| a.0 == b.0);
-        groups
-            .map(|group| group.iter().map(|(_, w)| w).sum::<f64>().powi(2))
+        weights.take_squares()
+    }
+}
+
+/// The coefficients of a polynomial in Chebyshev's polynomials `T_k`.
+struct Series(Vec<f64>);
+
+impl Series {
+    /// Taubin's smoothing in so many rounds, `((1 - lambda (1 - M)) (1 - mu (1 - M)))^rounds`.
+    ///
+    /// The mean `M` over neighbours has real eigenvalues between -1 and 1, since neighbours are mutual, and there every `T_k` is at most one: what is
+    /// left out of the series is at most the sum of its coefficients.
+    fn of_taubin(rounds: usize, factors: [f64; 2]) -> Self {
+        // As many as there are coefficients, so that these are exact.
+        let nodes = 2 * rounds + 1;
+        let angles = (0..4 * nodes).map(|k| PI * k as f64 / (2 * nodes) as f64);
+        let cosines: Vec<f64> = angles.map(f64::cos).collect();
+        let at_node = |node: usize| {
+            let eigenvalue = 1.0 - cosines[2 * node + 1];
+            let round: f64 = factors.iter().map(|f| 1.0 - f * eigenvalue).product();
+            round.powi(rounds as i32)
+        };
+        let values: Vec<f64> = (0..nodes).map(at_node).collect();
+        let coefficient = |order: usize| {
+            let pairs = values.iter().enumerate();
+            let terms = pairs.map(|(node, v)| v * cosines[order * (2 * node + 1) % (4 * nodes)]);
+            let weight = if order == 0 { 1.0 } else { 2.0 };
+            weight * terms.sum::<f64>() / nodes as f64
+        };
+        let mut coefficients: Vec<f64> = (0..nodes).map(coefficient).collect();
+        let mut left_out = 0.0;
+        while let Some(last) = coefficients.last() {
+            left_out += last.abs();
+            if left_out > NEGLIGIBLE {
+                break;
+            }
+            coefficients.pop();
+        }
+        Self(coefficients)
+    }
+}
+
+/// Weights of vertices, of which most are zero.
+struct Weights {
+    of_vertices: Vec<f64>,
+    /// Those that are not zero.
+    known: Vec<u32>,
+}
+
+impl Weights {
+    fn none(vertices: usize) -> Self {
+        Self {
+            of_vertices: vec![0.0; vertices],
+            known: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, vertex: u32, weight: f64) {
+        let sum = &mut self.of_vertices[vertex as usize];
+        if *sum == 0.0 {
+            self.known.push(vertex);
+        }
+        *sum += weight;
+    }
+
+    /// The sum of their squares; none are left.
+    fn take_squares(&mut self) -> f64 {
+        let all = self.known.drain(..);
+        all.map(|vertex| std::mem::take(&mut self.of_vertices[vertex as usize]).powi(2))
             .sum()
     }
 }
@@ -161,6 +266,16 @@ impl TriangleMesh {
     /// Every smoothing takes something of the long waves along; what `y - x` has of these is it, while noise averages out. What is
     /// wrong in the end is the product of two small errors, `(1 - A)(y - x)`; J. W. Tukey called this twicing.
     pub fn with_long_waves_of(&self, rough: &Self, wavelength: f64) -> Self {
+        self.with_long_waves_by(&Umbrellas::of(self), rough, wavelength)
+    }
+
+    /// The same, where the neighbours of its vertices are known.
+    pub(crate) fn with_long_waves_by(
+        &self,
+        umbrellas: &Umbrellas,
+        rough: &Self,
+        wavelength: f64,
+    ) -> Self {
         const ROUNDS: [f64; 2] = [12.0, 400.0];
         // On a lattice of equilateral triangles a wave has the eigenvalue (wave number times edge)^2 / 4.
         let wave = std::f64::consts::TAU / wavelength * self.mean_edge();
@@ -171,18 +286,8 @@ impl TriangleMesh {
             .clamp(ROUNDS[0], ROUNDS[1])
             .round() as usize;
         let pairs = self.points().into_iter().zip(rough.points());
-        let mut offset: Vec<Vector> = pairs.map(|(x, y)| y - x).collect();
-        Umbrellas::of(self).smooth(&mut offset, rounds, FACTORS);
-        self.moved_by(&offset)
-    }
-
-    /// A number at each vertex, averaged over its neighbours: waves of some ten edges and more stay, and of independent noise 0.36 of its
-    /// standard deviation.
-    pub(crate) fn averaged(&self, numbers: &[f64]) -> Vec<f64> {
-        const ROUNDS: usize = 8;
-        let mut x = numbers.to_vec();
-        Umbrellas::of(self).smooth(&mut x, ROUNDS, FACTORS);
-        x
+        let offset: Vec<Vector> = pairs.map(|(x, y)| y - x).collect();
+        self.moved_by(&umbrellas.smooth_much(&offset, rounds, FACTORS))
     }
 
     /// All vertices that may move moved along their normals by the same length, so that the closed surface encloses `volume`.
@@ -191,7 +296,11 @@ impl TriangleMesh {
         const STEPS: usize = 4;
         let mut moved = self.clone();
         for _ in 0..STEPS {
-            moved = moved.towards_volume(volume, &moves);
+            let missing = volume - moved.volume();
+            if missing.abs() <= REACHED * volume.abs() {
+                break;
+            }
+            moved = moved.grown_by(missing, &moves);
         }
         Self {
             normals: self.normals.clone(),
@@ -207,14 +316,14 @@ impl TriangleMesh {
             .collect()
     }
 
-    /// One step of Newton's method.
-    fn towards_volume(&self, volume: f64, moves: impl Fn(usize) -> bool) -> Self {
+    /// One step of Newton's method towards a volume that is larger by this.
+    fn grown_by(&self, missing: f64, moves: impl Fn(usize) -> bool) -> Self {
         let normals = self.moving_normals(moves);
         let derivative = self.volume_derivative(&normals);
         if derivative == 0.0 {
             return self.clone();
         }
-        let length = (volume - self.volume()) / derivative;
+        let length = missing / derivative;
         let offset: Vec<_> = normals.into_iter().map(|n| length * n).collect();
         self.moved_by(&offset)
     }
@@ -370,7 +479,7 @@ impl TriangleMesh {
     /// few neighbours.
     fn squared_noise(&self, umbrellas: &Umbrellas, normals: &[[f64; 3]]) -> Vec<Option<f64>> {
         let twice = umbrellas.laplacian(&umbrellas.laplacian(&self.points()));
-        let mut weights = Vec::new();
+        let mut weights = Weights::none(normals.len());
         let mut at = |v: usize| {
             let along = twice[v].dot(Vector::from_array(normals[v]));
             along * along / umbrellas.squared_weights(v, &mut weights)
@@ -384,19 +493,73 @@ impl TriangleMesh {
 mod tests {
     use rand::{RngExt, SeedableRng};
 
+    use super::{FACTORS, NEGLIGIBLE, Series, TAUBIN, Umbrellas};
     use crate::samples;
+    use crate::vector::Vector;
 
     /// Long waves are what a constant is here.
     #[test]
     fn averages_keep_long_waves_and_a_known_part_of_noise() {
         let mesh = samples::figure(48).unwrap();
         let count = mesh.mesh().vertices.len();
-        let averaged = |numbers: &[f64]| mesh.mesh().averaged(numbers);
+        let umbrellas = Umbrellas::of(mesh.mesh());
+        let averaged = |numbers: &[f64]| umbrellas.averaged(numbers);
         assert!((averaged(&vec![2.0; count]).iter()).all(|x| (x - 2.0).abs() < 1e-12));
         let mut rng = chacha20::ChaCha8Rng::seed_from_u64(1);
         let noise: Vec<f64> = (0..count).map(|_| rng.random::<f64>() - 0.5).collect();
         let squares = |numbers: &[f64]| numbers.iter().map(|x| x * x).sum::<f64>();
         let part = (squares(&averaged(&noise)) / squares(&noise)).sqrt();
         assert!((0.34..0.38).contains(&part), "{part}");
+    }
+
+    #[test]
+    fn a_few_terms_of_the_series_are_many_rounds() {
+        let mesh = samples::figure(48).unwrap();
+        let umbrellas = Umbrellas::of(mesh.mesh());
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(2);
+        let mut number = || rng.random::<f64>() - 0.5;
+        let count = mesh.mesh().vertices.len();
+        let field: Vec<Vector> = (0..count)
+            .map(|_| Vector::new(number(), number(), number()))
+            .collect();
+        for (rounds, factors, most) in [(3, TAUBIN, 7), (12, FACTORS, 25), (400, FACTORS, 80)] {
+            let mut expected = field.clone();
+            umbrellas.smooth(&mut expected, rounds, factors);
+            let found = umbrellas.smooth_much(&field, rounds, factors);
+            let far = found.iter().zip(&expected).map(|(a, b)| a.distance(*b));
+            let far = far.fold(0.0, f64::max);
+            assert!(far < 20.0 * NEGLIGIBLE, "{rounds} rounds: {far}");
+            let terms = Series::of_taubin(rounds, factors).0.len();
+            assert!(terms <= most, "{rounds} rounds: {terms} terms");
+        }
+    }
+
+    /// Against the coefficients of `L L x` for every basis vector.
+    #[test]
+    fn weights_of_two_laplacians_are_summed() {
+        let mesh = samples::figure(48).unwrap();
+        let umbrellas = Umbrellas::of(mesh.mesh());
+        let count = mesh.mesh().vertices.len();
+        let mut weights = super::Weights::none(count);
+        for vertex in (0..count).step_by(count / 5) {
+            let mut squares = 0.0;
+            for other in 0..count {
+                let mut unit = vec![0.0; count];
+                unit[other] = 1.0;
+                // Far from both, nothing arrives.
+                let is_near = umbrellas.around(vertex).iter().any(|&near| {
+                    near as usize == other
+                        || umbrellas.around(near as usize).contains(&(other as u32))
+                });
+                if is_near || other == vertex {
+                    let once: Vec<f64> = (0..count)
+                        .map(|v| umbrellas.laplacian_at(&unit, v))
+                        .collect();
+                    squares += umbrellas.laplacian_at(&once, vertex).powi(2);
+                }
+            }
+            let found = umbrellas.squared_weights(vertex, &mut weights);
+            assert!((found - squares).abs() < 1e-14, "{found} for {squares}");
+        }
     }
 }

@@ -11,7 +11,7 @@ use crate::common::{
 };
 use geometry::shapes::{self, Ball};
 use geometry::{Bricks, Field, Grid, Nodes, PhaseField, Placement, SignedDistance, Stored};
-use surfaces::{ClosedMesh, MeshDistance, mend_signs, samples};
+use surfaces::{ClosedMesh, MeshDistance, hausdorff_distance, mend_signs, samples};
 
 /// Distance to a segment.
 fn to_segment(x: Vector, [a, b]: [Vector; 2]) -> f64 {
@@ -179,6 +179,46 @@ fn points_that_are_not_finite_have_no_distance() {
         assert!(distance.signed_distance([bad, 0.0, 0.0]).is_nan(), "{bad}");
     }
     assert!(distance.signed_distance([0.5, 0.1, 0.2]).abs() < 1e-15);
+}
+
+/// Rows are searched in pieces, of which the last one is shorter here.
+#[test]
+fn rows_of_any_length_are_sampled() {
+    for cells in [8, 13, 21] {
+        let grid = Grid::<3>::centred(cells, 1.7).unwrap();
+        let distance = MeshDistance::new(&closed(torus(0.5, 0.2, 40, 20)));
+        let sampled = distance.sample(grid, &|| ()).unwrap();
+        let direct = Field::from_fn(grid, |x| distance.signed_distance(x));
+        for (a, b) in sampled.values().iter().zip(direct.values()) {
+            assert!((a - b).abs() < 1e-15, "{a} for {b} on {cells} cells");
+        }
+    }
+}
+
+#[test]
+fn the_hausdorff_distance_is_that_of_the_farthest_vertex() {
+    let torus = torus(0.5, 0.2, 40, 20);
+    let mut moved = torus.clone();
+    moved.roughen(0.03, 5);
+    let far = |a: &ClosedMesh, b: &ClosedMesh| {
+        let farthest = |points: &ClosedMesh, from: &ClosedMesh| {
+            let distances = MeshDistance::new(from).signed_distances(&points.mesh().vertices);
+            distances.into_iter().map(f64::abs).fold(0.0, f64::max)
+        };
+        farthest(a, b).max(farthest(b, a))
+    };
+    let torus = closed(torus);
+    // As many vertices in the same order, more of them, and another shape.
+    for other in [
+        closed(moved),
+        closed(translated(sphere([0.0; 3], 0.6, 3), [0.1, 0.0, 0.0])),
+        closed(cube(0.5)),
+        torus.clone(),
+    ] {
+        let found = hausdorff_distance(&torus, &other);
+        assert_eq!(found, far(&torus, &other));
+        assert_eq!(found, hausdorff_distance(&other, &torus));
+    }
 }
 
 #[test]
