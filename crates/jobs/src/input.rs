@@ -491,16 +491,15 @@ impl<'a> Reader<'a> {
     }
 
     /// The phase field of a mesh on the coarsest of some grids about it that has its components and holes, and the surface there, unless it touches
-    /// itself. Where even the last one does not have them this is told, or refused.
+    /// itself. Where even the last one does not have them this is told, or refused, as its field says.
     fn like_mesh(
         &mut self,
         mesh: &ClosedMesh,
         part: f64,
         grids: &[usize],
-        refuses: bool,
+        refuses: &dyn Fn(&Stored<3>) -> Result<bool>,
         vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
-        self.tell_overlap(mesh, refuses, vertices_follow)?;
         let wanted = Topology::of(mesh);
         let (field, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
@@ -511,7 +510,7 @@ impl<'a> Reader<'a> {
         let surface = self.marched(&field)?;
         if found != wanted {
             let loss = self.loss(mesh, &field, surface.as_ref(), found);
-            if refuses {
+            if refuses(&field)? {
                 return Err(Error::Lost {
                     loss: Box::new(loss),
                     may_allow: self.allows_loss.is_some(),
@@ -607,7 +606,8 @@ impl<'a> Reader<'a> {
         let grids = MESH_CELLS.into_iter().chain(FINER_CELLS);
         let grids: Vec<usize> = grids.filter(|&cells| cells >= coarsest).collect();
         let refuses = self.chosen.is_none() && self.allows_loss != Some(true);
-        let (field, _) = self.like_mesh(mesh, PART, &grids, refuses, false)?;
+        self.tell_overlap(mesh, refuses, false)?;
+        let (field, _) = self.like_mesh(mesh, PART, &grids, &|_| Ok(refuses), false)?;
         let space = Space {
             up,
             input: Some(Topology::of(mesh)),
@@ -621,7 +621,14 @@ impl<'a> Reader<'a> {
         let (rough, start) = (own.rough(), &own.fairing().start);
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let refuses = self.allows_loss != Some(true);
-        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, refuses, true)?;
+        self.tell_overlap(start, refuses, true)?;
+        let eps_over_h = self.eps_over_h;
+        // Vertices keep their distance from what the grid does not hold; and lids may touch each other where the surface does not.
+        let loses_much = |field: &Stored<3>| {
+            let much = || own.unresolved_part(field, eps_over_h * field.grid().spacing());
+            Ok(refuses && !own.has_lids() && much()? >= MOST_LOST)
+        };
+        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, &loses_much, true)?;
         let grid = field.grid();
         let sides = rough.mesh().sides(MOST_RAYS);
         let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));

@@ -70,6 +70,10 @@ struct OpenSurface {
     faces: usize,
     /// The places of the vertices at its boundary.
     rim: HashSet<[u64; 3]>,
+    /// Those of them from where it does not go on smoothly.
+    creases: HashSet<[u64; 3]>,
+    /// Parts that have no lids, and stay as they are.
+    left: TriangleMesh,
     noise: f64,
 }
 
@@ -79,6 +83,8 @@ impl OpenSurface {
             vertices: covered.vertices,
             faces: covered.faces,
             rim: covered.rim.iter().map(|x| key(*x)).collect(),
+            creases: covered.creases.iter().map(|x| key(*x)).collect(),
+            left: covered.left.clone(),
             noise: covered.noise(),
         }
     }
@@ -103,6 +109,22 @@ impl OpenSurface {
             .zip(rim)
             .map(|(near, rim)| *near && !rim)
             .collect()
+    }
+
+    /// Whether each vertex is at a crease.
+    fn creases(&self, mesh: &TriangleMesh) -> Vec<bool> {
+        let places = mesh.vertices.iter();
+        places.map(|x| self.creases.contains(&key(*x))).collect()
+    }
+
+    /// As [`TriangleMesh::untangled`], together with the parts that stay.
+    fn untangled(&self, moved: TriangleMesh, before: &TriangleMesh) -> TriangleMesh {
+        let [vertices, faces] = [moved.vertices.len(), moved.faces.len()];
+        let [moved, before] = [&moved, before].map(|mesh| mesh.beside(&self.left));
+        let mut all = moved.untangled(&before);
+        all.vertices.truncate(vertices);
+        all.faces.truncate(faces);
+        all
     }
 
     /// The surface alone.
@@ -187,7 +209,10 @@ impl OwnMesh {
         }
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
-            return Err(Refusal::KeepsAll.into());
+            return Err(match (&keep, &open) {
+                (None, Some(_)) => Refusal::NothingInside.into(),
+                _ => Refusal::KeepsAll.into(),
+            });
         }
         if keep.is_some() && !mesh.vertices.iter().any(|x| chosen(*x)) {
             let bounds = fairing.rough.bounding_box();
@@ -220,13 +245,26 @@ impl OwnMesh {
 
     /// A closed mesh of one that may be open, if its vertices follow the flow.
     fn closed(&self, mesh: &TriangleMesh) -> Result<(Mended, Option<OpenSurface>)> {
-        match ClosedMesh::mended(mesh.clone()) {
-            Err(surfaces::Error::Open { .. }) if !self.is_new => {
-                let covered = ClosedMesh::covered(mesh.clone()).map_err(Error::own_mesh)?;
+        use surfaces::Error::{MixedOrientation, NoArea, NonManifold, Open};
+        let error = match ClosedMesh::mended(mesh.clone()) {
+            Ok(mended) => return Ok((mended, None)),
+            Err(error) => error,
+        };
+        let may_have_lids = matches!(
+            error,
+            Open { .. } | NonManifold { .. } | MixedOrientation { .. } | NoArea { .. }
+        );
+        if self.is_new || !may_have_lids {
+            return Err(Error::own_mesh(error));
+        }
+        match ClosedMesh::covered(mesh.clone()) {
+            Ok(covered) => {
                 let open = OpenSurface::of(&covered);
                 Ok((covered.mended, Some(open)))
             }
-            mended => Ok((mended.map_err(Error::own_mesh)?, None)),
+            // What is wrong with the mesh itself says more, unless that are its holes.
+            Err(lids) if matches!(error, Open { .. }) => Err(Error::own_mesh(lids)),
+            Err(_) => Err(Error::own_mesh(error)),
         }
     }
 
@@ -262,6 +300,20 @@ impl OwnMesh {
             Err(other) => Err(Error::own_mesh(other)),
             Ok(_) => Ok(()),
         }
+    }
+
+    /// The part of the vertices at what the grid of the start does not hold.
+    pub fn unresolved_part(&self, start: &Stored<3>, eps: f64) -> Result<f64> {
+        let in_place = Placement::about([0.0; 3], 1.0)?;
+        let followed = self.fairing().follow(in_place, start, eps)?;
+        let lost = self.fairing().unresolved(&followed, thinnest(start.grid()));
+        let count = lost.iter().filter(|lost| **lost).count();
+        Ok(count as f64 / lost.len().max(1) as f64)
+    }
+
+    /// Whether the surface bounds something only with lids, which are no part of it.
+    pub fn has_lids(&self) -> bool {
+        self.loaded().open.is_some()
     }
 
     /// Whether what looks like noise is noise, and not the shape.
@@ -374,7 +426,7 @@ impl OwnMesh {
             }
             let normals = moved.vertex_normals();
             let faired = moved.vertices.clone();
-            moved.bend_least(&rings);
+            moved.bend_least_beside(&rings, &open.creases(rough.mesh()));
             // Along the surface vertices stay where they were.
             for ((x, from), normal) in moved.vertices.iter_mut().zip(&faired).zip(&normals) {
                 let along: f64 = (0..3).map(|i| (x[i] - from[i]) * normal[i]).sum();
@@ -388,7 +440,10 @@ impl OwnMesh {
         };
         let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
         moved = self.bounded(moved, volume, &free);
-        moved = moved.untangled(rough.mesh());
+        moved = match open {
+            Some(open) => open.untangled(moved, rough.mesh()),
+            None => moved.untangled(rough.mesh()),
+        };
         if moved.vertices == rough.mesh().vertices {
             edges = KeptEdges::default();
         }

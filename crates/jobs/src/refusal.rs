@@ -126,6 +126,11 @@ pub enum Refusal {
     /// All of the mesh stays.
     #[error("`keep` contains all of the mesh: nothing could move")]
     KeepsAll,
+    /// An open mesh without vertices that may move.
+    #[error(
+        "all vertices are at the boundary of the surface, which stays: nothing could move; subdivide the mesh, or give `remesh` and `repair`"
+    )]
+    NothingInside,
     /// Nothing of the mesh stays.
     #[error("`keep` contains no vertex of the mesh, which goes from {lower:?} to {upper:?}")]
     KeepsNothing {

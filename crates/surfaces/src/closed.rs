@@ -53,6 +53,21 @@ pub enum Warning {
     /// So many faces had their corners on a line.
     #[display("{_0} faces without area gave their longest sides to their neighbours")]
     Flat(usize),
+    /// So many edges of more than two faces, or of two that do not agree, were cut.
+    #[display(
+        "{_0} edges of more than two faces, or of two that do not agree, were cut: their vertices stay"
+    )]
+    Cut(usize),
+    /// So many parts of how many have no part in the flow.
+    #[display(
+        "{parts} of {all} open parts stay as they are, as lids on their holes would cross the surface"
+    )]
+    Left {
+        /// Parts that stay.
+        parts: usize,
+        /// All parts.
+        all: usize,
+    },
     /// So many holes have lids.
     #[display("{_0} holes were closed by smooth lids")]
     Lids(usize),

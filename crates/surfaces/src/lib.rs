@@ -58,6 +58,7 @@
 
 mod bound;
 mod closed;
+mod covering;
 mod crossings;
 mod distance;
 mod edges;
@@ -91,6 +92,7 @@ mod write;
 
 pub use bound::Bound;
 pub use closed::{ClosedMesh, Warning};
+pub use covering::Covered;
 pub use crossings::Overlap;
 pub use distance::{MeshDistance, hausdorff_distance};
 pub use edges::{Edges, KeptEdges};
@@ -101,7 +103,7 @@ pub use format::{up_axis, up_axis_of, usual_up_axis};
 pub use isosurface::{isosurface, lattice_surface, phase_field_surface};
 pub use label_mesh::{BACKGROUND, DepthDifference, LabelLattice, LabelMesh};
 pub use lids::Lids;
-pub use mending::{Covered, Mended};
+pub use mending::Mended;
 pub use mesh::{PlaceHasher, TriangleMesh};
 pub use parts::Parts;
 pub use read::error::FormatError;

@@ -1,7 +1,8 @@
 //! Holes of a surface, closed by smooth lids.
 
 use std::collections::{BTreeSet, HashMap};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use crate::vector::{Vector, scaled_normal};
 use crate::{Error, TriangleMesh};
@@ -23,6 +24,38 @@ pub struct Lids {
     pub holes: usize,
     /// For each vertex that was given, whether it is at a hole.
     pub rim: Vec<bool>,
+    /// The lids, one for each hole.
+    pub(crate) lids: Vec<Lid>,
+}
+
+/// A lid on a hole.
+#[derive(Clone, Debug)]
+pub(crate) struct Lid {
+    /// Its faces.
+    pub(crate) faces: Range<usize>,
+    /// Its vertices beside those of the rim.
+    pub(crate) vertices: Range<usize>,
+    /// Where they are on straight lines from the rim to the middle, and which part of such a line is behind them: 1 at the rim, 0 in the middle.
+    straight: Vec<(Vector, f64)>,
+    /// The area that the rim goes around, as a vector.
+    area: Vector,
+}
+
+impl Lid {
+    /// How large the hole is.
+    pub(crate) fn area(&self) -> f64 {
+        self.area.length()
+    }
+
+    /// Makes it a dome: a paraboloid over the rim, as high as this part of the radius of a disc of the same area.
+    pub(crate) fn make_dome(&self, mesh: &mut TriangleMesh, height: f64) {
+        let radius = (self.area() / PI).sqrt();
+        let up = self.area.normalize_or_zero() * (height * radius);
+        let vertices = &mut mesh.vertices[self.vertices.clone()];
+        for (x, (straight, part)) in vertices.iter_mut().zip(&self.straight) {
+            *x = (*straight + up * (1.0 - part * part)).to_array();
+        }
+    }
 }
 
 impl TriangleMesh {
@@ -32,22 +65,27 @@ impl TriangleMesh {
     /// # Errors
     /// [`Error::NonManifold`] and [`Error::MixedOrientation`] for edges with more faces, or with two in the same direction.
     pub fn with_lids(&self) -> Result<Lids, Error> {
+        let mut lids = self.with_straight_lids()?;
+        let mut free = vec![false; self.vertices.len()];
+        free.resize(lids.mesh.vertices.len(), true);
+        lids.mesh.bend_least(&free);
+        Ok(lids)
+    }
+
+    /// The same with lids on straight lines from the rims to their middles.
+    pub(crate) fn with_straight_lids(&self) -> Result<Lids, Error> {
         let loops = Rims::of(self)?.loops();
         let mut mesh = Self {
             normals: None,
             ..self.clone()
         };
         let mut rim = vec![false; self.vertices.len()];
-        let mut free = vec![false; self.vertices.len()];
-        for rounded in &loops {
-            for &vertex in rounded {
-                rim[vertex as usize] = true;
-            }
-            add_lid(&mut mesh, rounded);
+        for &vertex in loops.iter().flatten() {
+            rim[vertex as usize] = true;
         }
-        free.resize(mesh.vertices.len(), true);
-        mesh.bend_least(&free);
+        let lids = loops.iter().map(|around| add_lid(&mut mesh, around));
         Ok(Lids {
+            lids: lids.collect(),
             mesh,
             holes: loops.len(),
             rim,
@@ -59,8 +97,13 @@ impl TriangleMesh {
     /// The sum of the squares of the Laplacians at the free vertices and at those next to them, `sum |L x|^2 / A`, in the metric of the shape before,
     /// some times over: M. Botsch, L. Kobbelt: An intuitive framework for real-time freeform modeling. ACM Trans. Graph. 23 (2004).
     pub fn bend_least(&mut self, free: &[bool]) {
+        self.bend_least_beside(free, &[]);
+    }
+
+    /// The same where the surface does not go on smoothly from some vertices, the Laplacians at which do not count.
+    pub fn bend_least_beside(&mut self, free: &[bool], creases: &[bool]) {
         for _ in 0..METRICS {
-            let system = Bending::of(self, free);
+            let system = Bending::of(self, free, creases);
             if system.unknowns.is_empty() {
                 return;
             }
@@ -150,14 +193,35 @@ fn simple(around: &[u32]) -> Vec<Vec<u32>> {
 }
 
 /// Adds a lid along the vertices of a hole: rings of fewer and fewer vertices, on straight lines to the middle.
-fn add_lid(mesh: &mut TriangleMesh, around: &[u32]) {
-    if let [a, b, c] = *around {
-        mesh.faces.push([a, b, c]);
-        return;
-    }
-    let count = around.len();
+fn add_lid(mesh: &mut TriangleMesh, around: &[u32]) -> Lid {
+    let begin = [mesh.vertices.len(), mesh.faces.len()];
     let point = |v: u32| Vector::from_array(mesh.vertices[v as usize]);
     let rim: Vec<Vector> = around.iter().map(|&v| point(v)).collect();
+    let count = rim.len();
+    let sides = (0..count).map(|i| (rim[i] - rim[0]).cross(rim[(i + 1) % count] - rim[0]));
+    let area = 0.5 * sides.sum::<Vector>();
+    let mut parts = Vec::new();
+    if let [a, b, c] = *around {
+        mesh.faces.push([a, b, c]);
+    } else {
+        add_rings(mesh, around, &rim, &mut parts);
+    }
+    let vertices = begin[0]..mesh.vertices.len();
+    let straight = mesh.vertices[vertices.clone()].iter();
+    Lid {
+        faces: begin[1]..mesh.faces.len(),
+        straight: straight
+            .map(|&x| Vector::from_array(x))
+            .zip(parts)
+            .collect(),
+        vertices,
+        area,
+    }
+}
+
+/// Adds the rings and the middle of a lid; `parts` get how far they are from the middle to the rim.
+fn add_rings(mesh: &mut TriangleMesh, around: &[u32], rim: &[Vector], parts: &mut Vec<f64>) {
+    let count = rim.len();
     let middle = rim.iter().sum::<Vector>() / count as f64;
     let rings = ((count as f64 / TAU).round() as usize).clamp(1, MOST_RINGS);
     let mut outer = around.to_vec();
@@ -170,6 +234,7 @@ fn add_lid(mesh: &mut TriangleMesh, around: &[u32]) {
             let (before, weight) = (place as usize, place.fract());
             let on_rim = rim[before % count].lerp(rim[(before + 1) % count], weight);
             mesh.vertices.push(middle.lerp(on_rim, part).to_array());
+            parts.push(part);
         }
         let inner: Vec<u32> = (begin..begin + size as u32).collect();
         add_band(&mut mesh.faces, &outer, &inner);
@@ -177,6 +242,7 @@ fn add_lid(mesh: &mut TriangleMesh, around: &[u32]) {
     }
     let centre = mesh.vertices.len() as u32;
     mesh.vertices.push(middle.to_array());
+    parts.push(0.0);
     for i in 0..outer.len() {
         mesh.faces
             .push([outer[i], outer[(i + 1) % outer.len()], centre]);
@@ -214,7 +280,7 @@ struct Bending {
 const FIXED: usize = usize::MAX;
 
 impl Bending {
-    fn of(mesh: &TriangleMesh, free: &[bool]) -> Self {
+    fn of(mesh: &TriangleMesh, free: &[bool], creases: &[bool]) -> Self {
         let count = mesh.vertices.len();
         let mut counts = free.to_vec();
         for face in &mesh.faces {
@@ -223,6 +289,9 @@ impl Bending {
                     counts[vertex as usize] = true;
                 }
             }
+        }
+        for (counts, is_crease) in counts.iter_mut().zip(creases) {
+            *counts &= !is_crease;
         }
         let mut weights: Vec<Vec<(usize, f64)>> = vec![Vec::new(); count];
         let mut areas = vec![0.0; count];

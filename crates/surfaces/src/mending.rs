@@ -1,8 +1,9 @@
 //! Meshes whose faults are trifles, mended so that they bound a solid.
 
 use std::collections::HashMap;
+use std::ops::RangeBounds;
 
-use crate::closed::{Depths, Seams, drop_unreferenced, has_no_area, is_flat};
+use crate::closed::{Depths, Seams, is_flat};
 use crate::half_edges::HalfEdges;
 use crate::mesh::{has_three_corners, key};
 use crate::repair::orient;
@@ -72,78 +73,14 @@ impl ClosedMesh {
     }
 }
 
-/// An open surface with lids on its holes.
-#[derive(Clone, Debug)]
-pub struct Covered {
-    /// The closed mesh: the surface comes first, and then its lids.
-    pub mended: Mended,
-    /// How many vertices are those of the surface,
-    pub vertices: usize,
-    /// and how many faces.
-    pub faces: usize,
-    /// The places of the vertices at its holes.
-    pub rim: Vec<[f64; 3]>,
-}
-
-impl Covered {
-    /// The standard deviation of the noise of the surface, as [`TriangleMesh::noise`].
-    pub fn noise(&self) -> f64 {
-        self.mended.mesh.mesh().noise_of_first(self.vertices)
-    }
-}
-
-impl ClosedMesh {
-    /// An open surface with [lids](TriangleMesh::with_lids) on its holes, which is mended where exact coordinates and the neighbours of faces say how.
-    ///
-    /// # Errors
-    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`].
-    pub fn covered(mesh: TriangleMesh) -> Result<Covered, Error> {
-        let mut mending = Mending::of(mesh);
-        mending.merge();
-        let doubled = without_doubles(&mut mending.mesh);
-        mending.note(doubled, Warning::Doubled);
-        let turned = orient(&mut mending.mesh.faces);
-        mending.note(turned, Warning::Turned);
-        let unreferenced = drop_unreferenced(&mut mending.mesh);
-        mending.note(unreferenced, Warning::Unreferenced);
-        let surface = mending.mesh;
-        has_no_area(&surface)?;
-        let lids = surface.with_lids()?;
-        let crossing = |mesh: &TriangleMesh| mesh.crossing_faces().iter().filter(|c| **c).count();
-        let faces = crossing(&lids.mesh).saturating_sub(crossing(&surface));
-        let holes = lids.holes;
-        let (mesh, more) = match Self::new(lids.mesh) {
-            // A lid on what is flat lies on it.
-            Err(Error::NoVolume { .. }) => return Err(Error::LidCrosses { holes, faces }),
-            Ok(_) if faces > 0 => return Err(Error::LidCrosses { holes, faces }),
-            closed => closed?,
-        };
-        mending.changes.extend(more);
-        if holes > 0 {
-            mending.changes.push(Warning::Lids(holes));
-        }
-        let rim = surface.vertices.iter().zip(&lids.rim);
-        Ok(Covered {
-            vertices: surface.vertices.len(),
-            faces: surface.faces.len(),
-            rim: rim.filter(|(_, at)| **at).map(|(x, _)| *x).collect(),
-            mended: Mended {
-                mesh,
-                changes: mending.changes,
-                places: mending.places,
-            },
-        })
-    }
-}
-
-struct Mending {
-    mesh: TriangleMesh,
-    changes: Vec<Warning>,
-    places: Vec<[f64; 3]>,
+pub(crate) struct Mending {
+    pub(crate) mesh: TriangleMesh,
+    pub(crate) changes: Vec<Warning>,
+    pub(crate) places: Vec<[f64; 3]>,
 }
 
 impl Mending {
-    fn of(mesh: TriangleMesh) -> Self {
+    pub(crate) fn of(mesh: TriangleMesh) -> Self {
         Self {
             places: mesh.vertices.clone(),
             mesh,
@@ -152,7 +89,7 @@ impl Mending {
     }
 
     /// Makes vertices at exactly the same place one.
-    fn merge(&mut self) {
+    pub(crate) fn merge(&mut self) {
         let exact = self.mesh.merged();
         let merged = self.mesh.vertices.len() - exact.vertices.len();
         let collapsed = self.mesh.faces.len() - exact.faces.len();
@@ -165,7 +102,7 @@ impl Mending {
     fn sheets(mut self) -> Option<Self> {
         self.merge();
         self = self.joined()?;
-        let flat = flipped(&mut self.mesh)?;
+        let flat = flipped(&mut self.mesh, ..)?;
         self.note(flat, Warning::Flat);
         Some(self)
     }
@@ -188,7 +125,7 @@ impl Mending {
         })
     }
 
-    fn note(&mut self, count: usize, warning: fn(usize) -> Warning) {
+    pub(crate) fn note(&mut self, count: usize, warning: fn(usize) -> Warning) {
         self.changes.extend((count > 0).then(|| warning(count)));
     }
 
@@ -210,7 +147,7 @@ impl Mending {
         if near > 0.0 {
             mended.join(near);
         }
-        let doubled = without_doubles(&mut mended.mesh);
+        let doubled = without_doubles(&mut mended.mesh, Backs::Enclose);
         mended.note(doubled, Warning::Doubled);
         if let Err(Error::MixedOrientation { .. }) = HalfEdges::new(&mended.mesh) {
             let turned = orient(&mut mended.mesh.faces);
@@ -241,7 +178,7 @@ impl Mending {
     }
 
     /// Turns parts round that lie in a number of others that does not fit to their orientation.
-    fn orient_parts(&mut self) {
+    pub(crate) fn orient_parts(&mut self) {
         let Ok(seams) = Seams::find(&self.mesh) else {
             return;
         };
@@ -313,8 +250,17 @@ fn root(first: &mut [usize], mut vertex: usize) -> usize {
     vertex
 }
 
-/// Leaves out all but one of faces on the same vertices, and both of those that are each other's back; returns how many.
-pub(crate) fn without_doubles(mesh: &mut TriangleMesh) -> usize {
+/// What becomes of two faces that are each other's back.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Backs {
+    /// They enclose nothing, and both are left out.
+    Enclose,
+    /// They are a surface that is there twice, of which the first one stays.
+    Repeat,
+}
+
+/// Leaves out all but one of faces on the same vertices; returns how many.
+pub(crate) fn without_doubles(mesh: &mut TriangleMesh, backs: Backs) -> usize {
     let sorted = |face: &[u32; 3]| {
         let mut sorted = *face;
         sorted.sort_unstable();
@@ -335,7 +281,8 @@ pub(crate) fn without_doubles(mesh: &mut TriangleMesh) -> usize {
         let (vertices, forwards) = sorted(face);
         let counts = known.get_mut(&vertices).expect("all are counted");
         // The first one of the side of which there are more.
-        let stays = counts[usize::from(forwards)] > counts[usize::from(!forwards)];
+        let [these, others] = [forwards, !forwards].map(|side| counts[usize::from(side)]);
+        let stays = these > others || (backs == Backs::Repeat && these == others && these > 0);
         if stays {
             *counts = [0; 2];
         }
@@ -344,20 +291,28 @@ pub(crate) fn without_doubles(mesh: &mut TriangleMesh) -> usize {
     before - mesh.faces.len()
 }
 
-/// Flips the longest sides of faces without area, until all have some; returns how many had none. None if that does not help.
-pub(crate) fn flipped(mesh: &mut TriangleMesh) -> Option<usize> {
-    let count = |mesh: &TriangleMesh| mesh.faces.iter().filter(|f| is_flat(mesh, **f)).count();
-    let flat = count(mesh);
+/// Flips the longest sides of faces without area among these, with others among these, until all have some; returns how many had none. None if that
+/// does not help.
+pub(crate) fn flipped(mesh: &mut TriangleMesh, among: impl RangeBounds<usize>) -> Option<usize> {
+    let chosen: Vec<u32> = (0..mesh.faces.len() as u32)
+        .filter(|face| among.contains(&(*face as usize)))
+        .collect();
+    let flat = |mesh: &TriangleMesh| -> Vec<u32> {
+        let is_flat = |face: &u32| is_flat(mesh, mesh.faces[*face as usize]);
+        chosen.iter().copied().filter(is_flat).collect()
+    };
+    let first = flat(mesh).len();
     for _ in 0..ROUNDS {
-        if has_no_area(mesh).is_ok() {
-            return Some(flat);
+        if flat(mesh).is_empty() {
+            return Some(first);
         }
         let mut surface = HalfEdges::new(mesh).ok()?;
         let mut any = false;
-        for face in 0..mesh.faces.len() as u32 {
+        for &face in &chosen {
             let corners = [0, 1, 2].map(|i| surface.from(3 * face + i));
             if is_flat(mesh, corners) {
-                any |= flip_longest(mesh, &mut surface, face);
+                let is_chosen = |face: u32| among.contains(&(face as usize));
+                any |= flip_longest(mesh, &mut surface, face, is_chosen);
             }
         }
         if !any {
@@ -368,15 +323,21 @@ pub(crate) fn flipped(mesh: &mut TriangleMesh) -> Option<usize> {
     None
 }
 
-/// Flips the longest side of a face that can be flipped, if the two faces there are less flat then.
-fn flip_longest(mesh: &TriangleMesh, surface: &mut HalfEdges, face: u32) -> bool {
+/// Flips the longest side of a face that can be flipped with such a neighbour, if the two faces there are less flat then.
+fn flip_longest(
+    mesh: &TriangleMesh,
+    surface: &mut HalfEdges,
+    face: u32,
+    with: impl Fn(u32) -> bool,
+) -> bool {
     let point = |v: u32| Vector::from_array(mesh.vertices[v as usize]);
     let length = |h: u32| point(surface.to(h)).distance(point(surface.from(h)));
     let sides = [3 * face, 3 * face + 1, 3 * face + 2];
     let longest = sides
         .into_iter()
         .max_by(|a, b| length(*a).total_cmp(&length(*b)));
-    let Some(side) = longest.filter(|&side| surface.can_flip(side)) else {
+    let can_flip = |side: &u32| with(surface.twin(*side) / 3) && surface.can_flip(*side);
+    let Some(side) = longest.filter(can_flip) else {
         return false;
     };
     let [a, b, c] = [surface.from(side), surface.to(side), surface.opposite(side)];

@@ -175,6 +175,18 @@ impl TriangleMesh {
         merged
     }
 
+    /// Both meshes as one, the vertices and the faces of the other one behind those of this one. Normals are left out.
+    #[must_use]
+    pub fn beside(&self, other: &Self) -> Self {
+        let first = self.vertices.len() as u32;
+        let others = other.faces.iter().map(|face| face.map(|v| v + first));
+        Self {
+            vertices: [&self.vertices[..], &other.vertices].concat(),
+            faces: self.faces.iter().copied().chain(others).collect(),
+            normals: None,
+        }
+    }
+
     /// Keeps the given vertices, among which are those of all faces.
     pub(crate) fn keeping(&self, kept: &[usize]) -> Self {
         let mut index = vec![0; self.vertices.len()];

@@ -11,7 +11,7 @@ use crate::closed::{Depths, Seams, drop_unreferenced};
 use crate::crossings::touching;
 use crate::half_edges::HalfEdges;
 use crate::hierarchy::{Hierarchy, bounds};
-use crate::mending::{flipped, without_doubles};
+use crate::mending::{Backs, flipped, without_doubles};
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh, remeshed_surface};
 
@@ -114,7 +114,7 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     mesh.check(1e70)?;
     let mut old = mesh.merged();
     old.normals = None;
-    without_doubles(&mut old);
+    without_doubles(&mut old, Backs::Enclose);
     if old.faces.is_empty() {
         return Err(Error::NoFaces);
     }
@@ -137,11 +137,11 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
         let part = only(&old, &group.faces);
         if let Some((whole, holes)) = whole(&part) {
             changes.holes += holes;
-            append(&mut new, &whole);
+            new = new.beside(&whole);
         } else if let Some((made, components)) = made_anew(&part, spacing, cells)? {
             changes.anew += 1;
             changes.united += group.bodies.saturating_sub(components);
-            append(&mut new, &made);
+            new = new.beside(&made);
         } else {
             changes.left_out += 1;
         }
@@ -181,12 +181,6 @@ fn only(mesh: &TriangleMesh, faces: &[usize]) -> TriangleMesh {
     part
 }
 
-fn append(mesh: &mut TriangleMesh, other: &TriangleMesh) {
-    let first = mesh.vertices.len() as u32;
-    mesh.vertices.extend(&other.vertices);
-    (mesh.faces).extend(other.faces.iter().map(|face| face.map(|v| v + first)));
-}
-
 /// The part with its holes closed, and how many there were, if it is a surface that does not cross itself then.
 fn whole(part: &TriangleMesh) -> Option<(TriangleMesh, usize)> {
     let (mut mesh, holes) = match HalfEdges::new(part) {
@@ -197,7 +191,7 @@ fn whole(part: &TriangleMesh) -> Option<(TriangleMesh, usize)> {
         }
         Err(_) => return None,
     };
-    flipped(&mut mesh)?;
+    flipped(&mut mesh, ..)?;
     let area: f64 = mesh.sides(usize::MAX).map(|(_, _, area)| area).sum();
     let side = mesh.bounding_box()?.longest_side();
     let encloses = mesh.volume().abs() > ENCLOSES * area * side;

@@ -1,11 +1,12 @@
 //! Smoothing of meshes by their edges, and the noise that there is to smooth.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::{Add, Div, Mul, Sub};
 
 use geometry::parallel;
 
-use crate::vector::Vector;
+use crate::vector::{Vector, scaled_normal};
 use crate::{Parts, TriangleMesh};
 
 /// Rounds in which the squares of noise are averaged over neighbours, some forty of them,
@@ -415,14 +416,28 @@ impl TriangleMesh {
     ///
     /// Two signs tell the shape. Where it is smooth, and its polygons are few, the Laplacian `L` takes away most of it a second time, and nothing of noise:
     /// the estimate by `n . L L x` is far below that by `n . L x`. Where it has edges between sides that are flat, half of the vertices have next to no
-    /// `n . L x`, and the mean over neighbours is that of the edges.
+    /// `n . L x`, and the mean over neighbours is that of the edges. Where sides and bands are cut into triangles, many neighbours lie in a plane, which noise
+    /// never leaves there. And a few vertices tell nothing.
     pub fn shows_noise(&self, count: usize) -> bool {
+        /// The fewest vertices that tell noise from a shape,
+        const FEWEST: usize = 50;
+        /// the part of the edges whose faces lie in a plane that a shape made of flat pieces has,
+        const FLAT: f64 = 0.25;
+        /// and the part of the noise that is none.
+        const NOTHING: f64 = 1e-3;
         /// The least part of the one estimate in the other, which is 0.1 and less for smooth shapes without noise,
         const ROUGH: f64 = 0.2;
         /// and of the root of the median of squares in that of normal numbers, which is 0.13 and less for shapes with edges.
         const EVERYWHERE: f64 = 0.2;
         /// The median of the square of a normal number.
         const MEDIAN: f64 = 0.455;
+        if count.min(self.vertices.len()) < FEWEST {
+            return false;
+        }
+        let noise = self.noise_of_first(count);
+        if self.flat_edges(count, NOTHING * noise) > FLAT {
+            return false;
+        }
         let umbrellas = Umbrellas::of(self);
         let normals = self.smoothed_by(&umbrellas, 12, TAUBIN).vertex_normals();
         let median = |mut values: Vec<f64>| -> f64 {
@@ -442,6 +457,29 @@ impl TriangleMesh {
         };
         let ((single, once), (_, twice)) = (of_order(1), of_order(2));
         (twice / once).sqrt() >= ROUGH && (single / (MEDIAN * once)).sqrt() >= EVERYWHERE
+    }
+
+    /// The part of the edges between the first `count` vertices that both faces there lie in a plane, to this height.
+    fn flat_edges(&self, count: usize, height: f64) -> f64 {
+        let mut corners: HashMap<[u32; 2], Vector> = HashMap::with_capacity(3 * self.faces.len());
+        let (mut flat, mut all) = (0_usize, 0_usize);
+        for face in &self.faces {
+            if face.iter().any(|&v| v as usize >= count) {
+                continue;
+            }
+            let points = self.corners(*face);
+            let normal = scaled_normal(points).normalize_or_zero();
+            for i in 0..3 {
+                let edge = [face[i], face[(i + 1) % 3]];
+                if let Some(across) = corners.remove(&[edge[1], edge[0]]) {
+                    all += 1;
+                    flat += usize::from(normal.dot(across - points[i]).abs() <= height);
+                } else {
+                    corners.insert(edge, points[(i + 2) % 3]);
+                }
+            }
+        }
+        flat as f64 / all.max(1) as f64
     }
 
     /// `(n . L^k x)^2` at each vertex, divided by the sum of the squares of its coefficients, for one or two Laplacians.

@@ -41,9 +41,11 @@ impl Header {
         };
         // Files that begin with the counts are OFF, too.
         let word = row.split_whitespace().next().unwrap_or_default().to_owned();
-        if let Some(kind) = word.strip_suffix("OFF") {
+        // Some have no blank before the counts.
+        let letters = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        if let Some(kind) = letters.strip_suffix("OFF") {
             header.add_kind(kind, line, &word)?;
-            row = row.trim_start()[word.len()..].trim().to_owned();
+            row = row.trim_start()[letters.len()..].trim().to_owned();
             if row.starts_with("BINARY") {
                 return Err(FormatError::BinaryOff);
             }
@@ -107,6 +109,24 @@ fn numbers<'a>(words: &mut impl Iterator<Item = &'a str>) -> [f64; 3] {
     })
 }
 
+fn index(line: usize, word: &str, expected: &'static str) -> Result<i64, FormatError> {
+    let wrong = |_| FormatError::line(line, word, expected);
+    word.parse().map_err(wrong)
+}
+
+/// Adds the indices in a line until there are so many.
+fn take_corners<'a>(
+    line: usize,
+    words: impl Iterator<Item = &'a str>,
+    count: usize,
+    corners: &mut Vec<i64>,
+) -> Result<(), FormatError> {
+    for word in words.take(count - corners.len()) {
+        corners.push(index(line, word, "the index of a vertex")?);
+    }
+    Ok(())
+}
+
 pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let mut rows = rows(bytes);
     let header = Header::parse(&mut rows)?;
@@ -123,19 +143,20 @@ pub(super) fn decode(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let mut corners = Vec::new();
     for face in 0..header.faces {
         let end = FormatError::EndOfText(last, "a face");
-        let (line, row) = rows.next().ok_or(end)?;
-        last = line;
+        let (mut line, mut row) = rows.next().ok_or(end)?;
         corners.clear();
         let mut words = row.split_whitespace();
-        let mut next = |expected| {
-            let word = words.next().unwrap_or_default();
-            let wrong = |_| FormatError::line(line, word, expected);
-            word.parse::<i64>().map_err(wrong)
-        };
-        // What is behind the corners is the colour.
-        for _ in 0..next("the number of corners of a face")? {
-            corners.push(next("the index of a vertex")?);
+        let count = "the number of corners of a face";
+        let count = index(line, words.next().unwrap_or_default(), count)?;
+        let count = usize::try_from(count).unwrap_or(0);
+        take_corners(line, words, count, &mut corners)?;
+        // What is behind the corners is the colour, but they may go on in the next lines.
+        while corners.len() < count {
+            let end = FormatError::EndOfText(line, "the index of a vertex");
+            (line, row) = rows.next().ok_or(end)?;
+            take_corners(line, row.split_whitespace(), count, &mut corners)?;
         }
+        last = line;
         polygons.push(face, &corners)?;
     }
     mesh.faces = polygons.finish()?;
