@@ -21,6 +21,7 @@ pub mod calibration;
 pub mod inpainting_2d;
 pub mod inpainting_3d;
 pub mod denoising;
+pub mod public_meshes;
 pub mod unshrinking;
 pub mod performance;
 pub mod direct_learning;

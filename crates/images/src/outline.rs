@@ -198,12 +198,19 @@ fn smoothed(original: Vec<[f64; 2]>, farthest: f64, rounds: usize) -> Polyline {
     let count = original.len();
     let mut points = original.clone();
     let mut next = points.clone();
+    let most = (1.0 - 1e-9) * farthest * farthest;
     for _ in 0..rounds {
         for (k, point) in next.iter_mut().enumerate() {
             let [before, after] = [points[(k + count - 1) % count], points[(k + 1) % count]];
             let wanted =
                 [0, 1].map(|i| 0.25 * (before[i] + after[i]) + 0.5 * points[k][i] - original[k][i]);
-            let shorter = (farthest / wanted[0].hypot(wanted[1])).min(1.0);
+            // Next to none goes so far that its way has to be measured to the last bit.
+            let is_far = wanted[0] * wanted[0] + wanted[1] * wanted[1] > most;
+            let shorter = if is_far {
+                (farthest / wanted[0].hypot(wanted[1])).min(1.0)
+            } else {
+                1.0
+            };
             *point = [0, 1].map(|i| original[k][i] + shorter * wanted[i]);
         }
         std::mem::swap(&mut points, &mut next);

@@ -125,7 +125,7 @@ const MOST_LOST: f64 = 0.25;
 /// Rays by which the thickness of a mesh is measured.
 const MOST_RAYS: usize = 4096;
 /// Segments of an outline by which its thickness is measured.
-const MOST_SEGMENTS: usize = 1 << 14;
+const MOST_SEGMENTS: usize = 1 << 12;
 /// Cells along a mesh that is repaired, unless `cells` says how many.
 const REPAIR_CELLS: usize = 112;
 /// Images with more than this part of their pixels between two tones are no drawings.

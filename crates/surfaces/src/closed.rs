@@ -58,9 +58,12 @@ pub enum Warning {
         "{_0} edges of more than two faces, or of two that do not agree, were cut: their vertices stay"
     )]
     Cut(usize),
+    /// So many parts became plates.
+    #[display("{_0} open parts were made plates for the flow, as no lids close them")]
+    Plates(usize),
     /// So many parts of how many have no part in the flow.
     #[display(
-        "{parts} of {all} open parts stay as they are, as lids on their holes would cross the surface"
+        "{parts} of {all} open parts stay as they are, as what would close them crosses the surface"
     )]
     Left {
         /// Parts that stay.

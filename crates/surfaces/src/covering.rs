@@ -14,6 +14,10 @@ use crate::{ClosedMesh, Error, Mended, TriangleMesh, Warning};
 /// How high domes are over holes on which smooth lids would cross the surface or lie on it, as parts of the radius of the hole: the first of these that
 /// is free.
 const DOMES: [f64; 6] = [0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
+/// How far the copies of parts are that become plates, as parts of their longest sides: the first of these that is free.
+const PLATES: [f64; 6] = [-0.1, 0.1, -0.05, 0.05, -0.025, 0.025];
+/// Rounds in which the normals along which that is are averaged over neighbours.
+const AVERAGED: usize = 8;
 /// A part with its lids that encloses less than this part of its area times its longest side lies in a plane.
 const IN_A_PLANE: f64 = 1e-6;
 
@@ -47,8 +51,8 @@ impl ClosedMesh {
     ///
     /// Edges of more than two faces are cut: of the faces there, those stay neighbours between which the inside is, or of an odd number those that go
     /// on from each other with the least bend (A. Guéziec et al.: Cutting and stitching: converting sets of polygons to manifold surfaces. IEEE Trans.
-    /// Vis. Comput. Graph. 7 (2001)). Where a smooth lid would cross the surface or lie on it, a dome takes its place. Parts for which there is none
-    /// are left out.
+    /// Vis. Comput. Graph. 7 (2001)). Where a smooth lid would cross the surface, a dome takes its place. A part in a plane, and one with
+    /// lids that still cross, becomes a plate, with a copy of it beside it. Parts for which there is no place are left out.
     ///
     /// # Errors
     /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`] if no part is left.
@@ -65,21 +69,22 @@ impl ClosedMesh {
         mending.note(unreferenced, Warning::Unreferenced);
         let flat = with_area(&mut mending.mesh)?;
         mending.note(flat, Warning::Flat);
-        let Apart {
-            mesh,
-            surface: [vertices, faces],
-            rim,
-            mut creases,
-            left,
-            parts: [left_parts, all],
-            holes,
-        } = Apart::of(&mending.mesh)?;
-        if left_parts > 0 {
-            let parts = left_parts;
-            mending.changes.push(Warning::Left { parts, all });
+        let (apart, closed) = Apart::of(&mending.mesh)?;
+        let count = |closing: Closing| apart.closings.iter().filter(|c| **c == closing).count();
+        let stays = |lid: usize| apart.closings[apart.part_of(lid)] != Closing::Left;
+        let rim = apart.rims(stays);
+        let is_crease = |lid: usize| !apart.has_lids(apart.part_of(lid)) || apart.is_dome[lid];
+        let mut creases = apart.rims(|lid| stays(lid) && is_crease(lid));
+        let (left, holes) = (apart.left(), apart.chosen_lids().count());
+        let [lost, all] = [count(Closing::Left), apart.closings.len()];
+        let plates = all - lost - count(Closing::Lids);
+        let [vertices, faces] = closed.surface;
+        if lost > 0 {
+            mending.changes.push(Warning::Left { parts: lost, all });
         }
         mending.note(holes, Warning::Lids);
-        mending.mesh = mesh;
+        mending.note(plates, Warning::Plates);
+        mending.mesh = closed.mesh;
         mending.orient_parts();
         let (mesh, more) = Self::new(mending.mesh)?;
         mending.changes.extend(more);
@@ -111,140 +116,256 @@ fn with_area(surface: &mut TriangleMesh) -> Result<usize, Error> {
     Ok(flat)
 }
 
-/// A surface with lids that neither cross it nor lie on it.
-struct Apart {
+/// How a part of a surface is closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Closing {
+    /// By lids on its holes.
+    Lids,
+    /// By its own copy, which is so many longest sides of the part away along the normals, and a band between both rims.
+    Plate(usize),
+    /// Not at all: it is left out.
+    Left,
+}
+
+impl Closing {
+    /// What is tried next.
+    fn next(self) -> Self {
+        match self {
+            Self::Lids => Self::Plate(0),
+            Self::Plate(last) if last + 1 < PLATES.len() => Self::Plate(last + 1),
+            _ => Self::Left,
+        }
+    }
+}
+
+/// A surface, and what closes its parts without crossing them.
+struct Apart<'a> {
+    surface: &'a TriangleMesh,
+    lids: Lids,
+    seams: Seams,
+    is_dome: Vec<bool>,
+    closings: Vec<Closing>,
+}
+
+/// A closed surface.
+struct Closed {
     mesh: TriangleMesh,
+    /// The part of each face.
+    part: Vec<usize>,
     /// Vertices and faces of the surface, which come first.
     surface: [usize; 2],
-    rim: Vec<[f64; 3]>,
-    /// The vertices at domes.
-    creases: Vec<[f64; 3]>,
-    left: TriangleMesh,
-    /// How many parts are left out, and how many there are.
-    parts: [usize; 2],
-    /// How many holes are closed.
-    holes: usize,
 }
 
-impl Apart {
-    fn of(surface: &TriangleMesh) -> Result<Self, Error> {
-        let [vertices, faces] = [surface.vertices.len(), surface.faces.len()];
-        let mut lids = surface.with_straight_lids()?;
+impl<'a> Apart<'a> {
+    fn of(surface: &'a TriangleMesh) -> Result<(Self, Closed), Error> {
+        let lids = surface.with_straight_lids()?;
         let seams = Seams::find(&lids.mesh)?;
-        let mut is_dome = vec![false; lids.lids.len()];
-        let mut free = vec![false; lids.mesh.vertices.len()];
-        let in_a_plane = in_a_plane(&lids, &seams);
-        for (lid, is_dome) in lids.lids.iter().zip(&mut is_dome) {
-            let part = seams.component[lid.faces.start] as usize;
-            *is_dome = in_a_plane[part] == Some(lid.faces.start);
-            free[lid.vertices.clone()].fill(in_a_plane[part].is_none());
+        let mut apart = Self {
+            surface,
+            is_dome: vec![false; lids.lids.len()],
+            closings: vec![Closing::Lids; seams.components],
+            lids,
+            seams,
+        };
+        for part in apart.in_a_plane() {
+            apart.closings[part] = Closing::Plate(0);
         }
-        for lid in (0..is_dome.len()).filter(|lid| is_dome[*lid]) {
-            lids.lids[lid].make_dome(&mut lids.mesh, DOMES[0]);
-        }
-        lids.mesh.bend_least(&free);
-        let mut crossing = lids.that_cross();
-        for height in DOMES {
+        apart.bend();
+        apart.raise_domes();
+        loop {
+            let closed = apart.closed();
+            let mut crossing = closed.that_cross();
             if crossing.is_empty() {
-                break;
+                return Ok((apart, closed));
             }
-            for &lid in &crossing {
-                is_dome[lid] = true;
-                lids.lids[lid].make_dome(&mut lids.mesh, height);
+            // Lids that were good are so when a plate has found its place.
+            let of_plates = |part: &usize| apart.closings[*part] != Closing::Lids;
+            if crossing.iter().any(of_plates) {
+                crossing.retain(of_plates);
             }
-            crossing = lids.that_cross();
+            for part in crossing {
+                apart.closings[part] = apart.closings[part].next();
+            }
+            if apart.closings.iter().all(|c| *c == Closing::Left) {
+                return Err(Error::LidCrosses {
+                    holes: apart.lids.holes,
+                    faces: (apart.lids.mesh.crossing_faces().iter())
+                        .filter(|crosses| **crosses)
+                        .count(),
+                });
+            }
         }
-        // Faces of lids on straight rims.
-        flipped(&mut lids.mesh, faces..);
-        let part_of = |lid: usize| seams.component[lids.lids[lid].faces.start];
-        let left: HashSet<u32> = crossing.iter().map(|&lid| part_of(lid)).collect();
-        if left.len() == seams.components {
-            return Err(Error::LidCrosses {
-                holes: lids.holes,
-                faces: (lids.mesh.crossing_faces().iter()).filter(|c| **c).count(),
-            });
+    }
+
+    fn part_of(&self, lid: usize) -> usize {
+        self.seams.component[self.lids.lids[lid].faces.start] as usize
+    }
+
+    fn has_lids(&self, part: usize) -> bool {
+        self.closings[part] == Closing::Lids
+    }
+
+    /// The lids of parts that have some.
+    fn chosen_lids(&self) -> impl Iterator<Item = usize> {
+        (0..self.lids.lids.len()).filter(|lid| self.has_lids(self.part_of(*lid)))
+    }
+
+    /// Makes the lids smooth.
+    fn bend(&mut self) {
+        let mut free = vec![false; self.lids.mesh.vertices.len()];
+        for lid in self.chosen_lids() {
+            free[self.lids.lids[lid].vertices.clone()].fill(true);
         }
-        let at = |which: &dyn Fn(usize) -> bool| -> BTreeSet<u32> {
-            let of_lids = (0..lids.lids.len()).filter(|lid| which(*lid));
-            let corners = of_lids
-                .flat_map(|lid| lids.mesh.faces[lids.lids[lid].faces.clone()].as_flattened());
-            corners
-                .copied()
-                .filter(|v| (*v as usize) < vertices)
-                .collect()
+        self.lids.mesh.bend_least(&free);
+        // Faces on straight rims, which stay if that does not help.
+        flipped(&mut self.lids.mesh, self.surface.faces.len()..);
+    }
+
+    /// Makes lids that cross something domes.
+    fn raise_domes(&mut self) {
+        for height in DOMES {
+            let crosses = self.lids.mesh.crossing_faces();
+            let lids = &self.lids.lids;
+            let crosses = |lid: &usize| crosses[lids[*lid].faces.clone()].contains(&true);
+            let crossing: Vec<usize> = self.chosen_lids().filter(crosses).collect();
+            if crossing.is_empty() {
+                return;
+            }
+            for lid in crossing {
+                self.is_dome[lid] = true;
+                self.lids.lids[lid].make_dome(&mut self.lids.mesh, height);
+            }
+        }
+    }
+
+    /// The parts that lie in a plane, or whose straight lids lie on them.
+    fn in_a_plane(&self) -> Vec<usize> {
+        let mesh = &self.lids.mesh;
+        let parts = self.seams.parts(mesh);
+        let is_flat = |part: &usize| {
+            let faces = &parts[*part];
+            let areas = faces
+                .iter()
+                .map(|&face| 0.5 * scaled_normal(mesh.corners(face)).length());
+            let area: f64 = areas.sum();
+            mesh.volume_behind(faces).abs() <= IN_A_PLANE * area * longest_side(mesh, faces)
         };
-        let places = |at: BTreeSet<u32>| {
-            at.into_iter()
-                .map(|v| surface.vertices[v as usize])
-                .collect()
+        (0..parts.len()).filter(is_flat).collect()
+    }
+
+    /// The parts as they are closed.
+    fn closed(&self) -> Closed {
+        let count = self.surface.faces.len();
+        let all = &self.lids.mesh;
+        let part_of = |face: usize| self.seams.component[face] as usize;
+        let kept = (0..count).filter(|&face| self.closings[part_of(face)] != Closing::Left);
+        let kept: Vec<usize> = kept.collect();
+        let lids = (count..all.faces.len()).filter(|&face| self.has_lids(part_of(face)));
+        let faces: Vec<usize> = kept.iter().copied().chain(lids).collect();
+        let mut mesh = TriangleMesh {
+            faces: faces.iter().map(|&face| all.faces[face]).collect(),
+            ..all.clone()
         };
-        let stays = |lid: usize| !left.contains(&part_of(lid));
-        let (rim, creases) = (
-            places(at(&stays)),
-            places(at(&|lid| stays(lid) && is_dome[lid])),
-        );
-        let holes = (0..lids.lids.len()).filter(|lid| stays(*lid)).count();
-        let of = |is_left: bool, count: usize| TriangleMesh {
-            faces: (lids.mesh.faces[..count].iter().zip(&seams.component))
-                .filter(|(_, part)| left.contains(part) == is_left)
-                .map(|(face, _)| *face)
-                .collect(),
-            ..lids.mesh.clone()
-        };
-        let mut used = vec![false; vertices];
-        let surface = of(false, faces);
-        for &v in surface.faces.as_flattened() {
+        let mut part: Vec<usize> = faces.into_iter().map(part_of).collect();
+        let mut used = vec![false; self.surface.vertices.len()];
+        for &v in mesh.faces[..kept.len()].as_flattened() {
             used[v as usize] = true;
         }
-        let [mut mesh, mut without] = [of(false, lids.mesh.faces.len()), of(true, faces)];
+        for (number, closing) in self.closings.iter().enumerate() {
+            if let Closing::Plate(place) = closing {
+                let own = kept.iter().filter(|&&face| part_of(face) == number);
+                let own: Vec<[u32; 3]> = own.map(|&face| all.faces[face]).collect();
+                add_plate(&mut mesh, &own, PLATES[*place]);
+                part.resize(mesh.faces.len(), number);
+            }
+        }
         drop_unreferenced(&mut mesh);
-        drop_unreferenced(&mut without);
-        Ok(Self {
+        Closed {
             mesh,
-            surface: [
-                used.iter().filter(|used| **used).count(),
-                surface.faces.len(),
-            ],
-            rim,
-            creases,
-            left: without,
-            parts: [left.len(), seams.components],
-            holes,
-        })
-    }
-}
-
-/// For each part that lies in a plane, or whose straight lids lie on it, the first face of the largest of its lids.
-fn in_a_plane(lids: &Lids, seams: &Seams) -> Vec<Option<usize>> {
-    let mut largest: Vec<Option<(f64, usize)>> = vec![None; seams.components];
-    for lid in &lids.lids {
-        let known = &mut largest[seams.component[lid.faces.start] as usize];
-        if known.is_none_or(|(area, _)| lid.area() > area) {
-            *known = Some((lid.area(), lid.faces.start));
+            part,
+            surface: [used.iter().filter(|used| **used).count(), kept.len()],
         }
     }
-    let parts = seams.parts(&lids.mesh);
-    let is_flat = |faces: &Vec<[u32; 3]>| {
-        let corners = faces.as_flattened().iter();
-        let bounds = BoundingBox::around(corners.map(|&v| lids.mesh.vertices[v as usize]));
-        let side = bounds.map_or(0.0, |bounds| bounds.longest_side());
-        let areas = faces
-            .iter()
-            .map(|&face| 0.5 * scaled_normal(lids.mesh.corners(face)).length());
-        let area: f64 = areas.sum();
-        lids.mesh.volume_behind(faces).abs() <= IN_A_PLANE * area * side
-    };
-    (largest.into_iter().zip(&parts))
-        .map(|(lid, faces)| lid.filter(|_| is_flat(faces)).map(|(_, first)| first))
-        .collect()
+
+    /// The parts that are left out.
+    fn left(&self) -> TriangleMesh {
+        let faces = self.surface.faces.iter().zip(&self.seams.component);
+        let is_left = |part: u32| self.closings[part as usize] == Closing::Left;
+        let faces = faces.filter(|(_, part)| is_left(**part));
+        let mut left = TriangleMesh {
+            faces: faces.map(|(face, _)| *face).collect(),
+            ..self.surface.clone()
+        };
+        drop_unreferenced(&mut left);
+        left
+    }
+
+    /// The places of the vertices of the surface at lids of these parts.
+    fn rims(&self, of: impl Fn(usize) -> bool) -> Vec<[f64; 3]> {
+        let lids = (0..self.lids.lids.len()).filter(|lid| of(*lid));
+        let faces = lids.flat_map(|lid| self.lids.lids[lid].faces.clone());
+        let corners = faces.flat_map(|face| self.lids.mesh.faces[face]);
+        let at: BTreeSet<u32> = corners
+            .filter(|v| (*v as usize) < self.surface.vertices.len())
+            .collect();
+        (at.into_iter())
+            .map(|v| self.surface.vertices[v as usize])
+            .collect()
+    }
 }
 
-impl Lids {
-    /// The lids of which faces cross others.
+impl Closed {
+    /// The parts of which something crosses that is not of the surface.
     fn that_cross(&self) -> Vec<usize> {
         let crosses = self.mesh.crossing_faces();
-        let crosses = |lid: &usize| crosses[self.lids[*lid].faces.clone()].contains(&true);
-        (0..self.lids.len()).filter(crosses).collect()
+        let added = (self.surface[1]..crosses.len()).filter(|face| crosses[*face]);
+        let parts: BTreeSet<usize> = added.map(|face| self.part[face]).collect();
+        parts.into_iter().collect()
+    }
+}
+
+fn longest_side(mesh: &TriangleMesh, faces: &[[u32; 3]]) -> f64 {
+    let corners = faces.as_flattened().iter();
+    let bounds = BoundingBox::around(corners.map(|&v| mesh.vertices[v as usize]));
+    bounds.map_or(0.0, |bounds| bounds.longest_side())
+}
+
+/// Adds a copy of some faces, turned round, so many of their longest sides away along the averaged normals, and a band between the rims of both.
+fn add_plate(mesh: &mut TriangleMesh, faces: &[[u32; 3]], height: f64) {
+    let height = height * longest_side(mesh, faces);
+    let mut copy: BTreeMap<u32, (u32, Vector)> = BTreeMap::new();
+    for &face in faces {
+        let normal = scaled_normal(mesh.corners(face));
+        for vertex in face {
+            copy.entry(vertex).or_default().1 += normal;
+        }
+    }
+    for _ in 0..AVERAGED {
+        let before = copy.clone();
+        for face in faces {
+            let sum: Vector = face.iter().map(|v| before[v].1.normalize_or_zero()).sum();
+            for vertex in face {
+                copy.entry(*vertex).or_default().1 += sum;
+            }
+        }
+        for (_, normal) in copy.values_mut() {
+            *normal = normal.normalize_or_zero();
+        }
+    }
+    for (&vertex, (number, normal)) in &mut copy {
+        *number = mesh.vertices.len() as u32;
+        let x = Vector::from_array(mesh.vertices[vertex as usize]) + *normal * height;
+        mesh.vertices.push(x.to_array());
+    }
+    let mut sides: BTreeSet<[u32; 2]> = BTreeSet::new();
+    for face in faces {
+        sides.extend((0..3).map(|i| [face[i], face[(i + 1) % 3]]));
+        let [a, b, c] = face.map(|v| copy[&v].0);
+        mesh.faces.push([a, c, b]);
+    }
+    for &[a, b] in sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a])) {
+        let [c, d] = [a, b].map(|v| copy[&v].0);
+        mesh.faces.extend([[b, a, c], [b, c, d]]);
     }
 }
 
@@ -303,7 +424,30 @@ impl Cuts {
             .map(|v| mesh.vertices[*v as usize])
             .collect();
         fans.separate(mesh, &singular);
+        detach(mesh);
         Self { edges, places }
+    }
+}
+
+/// Gives faces their own vertices at edges that others run through in the same direction: those whose fans come together again elsewhere.
+fn detach(mesh: &mut TriangleMesh) {
+    let mut known: HashSet<[u32; 2]> = HashSet::with_capacity(3 * mesh.faces.len());
+    for face in 0..mesh.faces.len() {
+        let edges = |face: [u32; 3]| [0, 1, 2].map(|i| [face[i], face[(i + 1) % 3]]);
+        if edges(mesh.faces[face])
+            .iter()
+            .any(|edge| known.contains(edge))
+        {
+            for i in 0..3 {
+                let vertex = mesh.faces[face][i] as usize;
+                mesh.faces[face][i] = mesh.vertices.len() as u32;
+                mesh.vertices.push(mesh.vertices[vertex]);
+                if let Some(normals) = &mut mesh.normals {
+                    normals.push(normals[vertex]);
+                }
+            }
+        }
+        known.extend(edges(mesh.faces[face]));
     }
 }
 

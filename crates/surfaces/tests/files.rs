@@ -584,6 +584,7 @@ fn off_variants_are_understood() {
         "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n",
         "# made by hand\n\nOFF 4 4\n\n0 0 0\n1 0 0 # a corner\n\n0 1 0\n0 0 1\n\n",
         "4 4 0\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n0 0 1\r\n",
+        "\tOFF4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n",
         "\u{feff}COFF\n4 4 0\n0 0 0 255 0 0 255\n1 0 0 0 9 0 255\n0 1 0 0 0 9 255\n0 0 1 1 2 3 255\n",
     ] {
         let text = [vertices, faces].concat();
@@ -592,6 +593,14 @@ fn off_variants_are_understood() {
         assert!(moved.contains("1.5 0.5 0.5"), "{moved}");
         assert!(moved.ends_with(faces), "{moved}");
     }
+    // Corners go on in the next lines.
+    let vertices = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+    let broken = [
+        vertices,
+        "3 0 2\n1\n3 0\n1 3 255 0 0\n3\n0 3 2 # red\n3 1 2 3\n",
+    ]
+    .concat();
+    assert_reads("off", broken.as_bytes(), &expected);
     // Colours as whole numbers and as parts of 1, behind normals.
     let colours = |text: &str| surfaces::vertex_colours(text.as_bytes(), "a.off").unwrap();
     let coloured =
@@ -653,7 +662,7 @@ fn broken_off_files_are_explained() {
         ),
         (
             "OFF\n1 1 0\n0 0 0\n3 0 0",
-            "line 4 has \"\" where the index of a vertex is expected",
+            "the file ends in line 4 where the index of a vertex is expected: it is truncated",
         ),
         (
             "OFF\n1 1 0\n0 0 0\n3 0 0 1",
@@ -665,7 +674,7 @@ fn broken_off_files_are_explained() {
         ),
         (
             "OFF\n1 1 0\n0 0 0\n9999999999 0 0",
-            "line 4 has \"\" where the index of a vertex is expected",
+            "the file ends in line 4 where the index of a vertex is expected: it is truncated",
         ),
     ] {
         assert_eq!(message(text), expected, "{text:?}");

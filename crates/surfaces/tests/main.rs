@@ -3,6 +3,7 @@
 mod bounds;
 mod closed;
 mod common;
+mod covering;
 mod distances;
 mod edges;
 mod fairing;
