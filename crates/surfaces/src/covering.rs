@@ -16,6 +16,8 @@ use crate::{ClosedMesh, Error, Mended, TriangleMesh, Warning};
 const DOMES: [f64; 6] = [0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
 /// How far the copies of parts are that become plates, as parts of their longest sides: the first of these that is free.
 const PLATES: [f64; 6] = [-0.1, 0.1, -0.05, 0.05, -0.025, 0.025];
+/// If more than this part of the area can only be left out, the surface is refused.
+const MOST_LEFT: f64 = 0.5;
 /// Rounds in which the normals along which that is are averaged over neighbours.
 const AVERAGED: usize = 8;
 /// A part with its lids that encloses less than this part of its area times its longest side lies in a plane.
@@ -55,7 +57,7 @@ impl ClosedMesh {
     /// lids that still cross, becomes a plate, with a copy of it beside it. Parts for which there is no place are left out.
     ///
     /// # Errors
-    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`] if no part is left.
+    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`] if more than half of the area would be left out.
     pub fn covered(mesh: TriangleMesh) -> Result<Covered, Error> {
         let mut mending = Mending::of(mesh);
         mending.merge();
@@ -186,7 +188,7 @@ impl<'a> Apart<'a> {
             for part in crossing {
                 apart.closings[part] = apart.closings[part].next();
             }
-            if apart.closings.iter().all(|c| *c == Closing::Left) {
+            if apart.part_left() > MOST_LEFT {
                 return Err(Error::LidCrosses {
                     holes: apart.lids.holes,
                     faces: (apart.lids.mesh.crossing_faces().iter())
@@ -285,6 +287,19 @@ impl<'a> Apart<'a> {
             part,
             surface: [used.iter().filter(|used| **used).count(), kept.len()],
         }
+    }
+
+    /// The part of the area that is left out.
+    fn part_left(&self) -> f64 {
+        let (mut left, mut all) = (0.0, 0.0);
+        for (face, part) in self.surface.faces.iter().zip(&self.seams.component) {
+            let area = scaled_normal(self.surface.corners(*face)).length();
+            all += area;
+            if self.closings[*part as usize] == Closing::Left {
+                left += area;
+            }
+        }
+        left / f64::max(all, f64::MIN_POSITIVE)
     }
 
     /// The parts that are left out.
@@ -407,11 +422,16 @@ impl Cuts {
         let mut singular = BTreeSet::new();
         let mut fans = Fans((0..3 * mesh.faces.len()).collect());
         let mut edges = 0;
+        // Of what is inside out, the other side is inside.
+        let is_inside_out = mesh.volume() < 0.0;
         for (ends, edge) in &mut sides {
             if is_singular(edge) {
                 edges += 1;
                 singular.extend(*ends);
                 set_angles(mesh, *ends, edge);
+                if is_inside_out {
+                    edge.iter_mut().for_each(|side| side.upwards ^= true);
+                }
                 for [up, down] in pairs(edge) {
                     fans.join_across(up, down);
                 }

@@ -61,7 +61,7 @@ impl TriangleMesh {
     pub fn untangled(mut self, before: &Self) -> Self {
         /// Rounds in which such vertices go half of their way back, before they and more and more of their neighbours go all of it.
         const HALVINGS: usize = 4;
-        const ROUNDS: usize = 12;
+        const ROUNDS: usize = 30;
         let count = |crosses: &[bool]| crosses.iter().filter(|crosses| **crosses).count();
         let mut crossed_before = None;
         let mut fewest: Option<(usize, Self)> = None;

@@ -308,7 +308,7 @@ fn inputs(options: &Options) -> Result<Vec<Input>> {
 }
 
 fn quick_inputs() -> Result<Vec<Input>> {
-    let mut noisy = samples::lever(24)?.into_mesh();
+    let mut noisy = samples::lever(48)?.into_mesh();
     let clean = noisy.clone();
     let side = noisy.bounding_box().map_or(1.0, |b| b.longest_side());
     noisy.roughen(0.01 * side, 1);
