@@ -318,10 +318,12 @@ impl OwnMesh {
 
     /// Whether what looks like noise is noise, and not the shape.
     pub fn shows_noise(&self) -> bool {
-        let surface = self.loaded().open.as_ref().map(|open| open.vertices);
-        self.rough()
-            .mesh()
-            .shows_noise(surface.unwrap_or(usize::MAX))
+        let rough = self.rough().mesh();
+        match &self.loaded().open {
+            None => rough.shows_noise(usize::MAX),
+            Some(open) if open.creases.is_empty() => rough.shows_noise(open.vertices),
+            Some(open) => open.without_lids(rough).shows_noise(usize::MAX),
+        }
     }
 
     /// What becomes of the vertices.

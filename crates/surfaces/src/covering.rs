@@ -41,9 +41,18 @@ pub struct Covered {
 }
 
 impl Covered {
-    /// The standard deviation of the noise of the surface, as [`TriangleMesh::noise`].
+    /// The standard deviation of the noise of the surface, as [`TriangleMesh::noise`]. Creases at its boundary are none.
     pub fn noise(&self) -> f64 {
-        self.mended.mesh.mesh().noise_of_first(self.vertices)
+        let mesh = self.mended.mesh.mesh();
+        if self.creases.is_empty() {
+            return mesh.noise_of_first(self.vertices);
+        }
+        let surface = TriangleMesh {
+            vertices: mesh.vertices[..self.vertices].to_vec(),
+            faces: mesh.faces[..self.faces].to_vec(),
+            normals: None,
+        };
+        surface.noise()
     }
 }
 

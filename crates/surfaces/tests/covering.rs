@@ -129,7 +129,7 @@ fn parts_that_nothing_closes_stay() {
     let without = covered(together(sheets.clone(), &ball));
     assert_eq!(without.left.faces.len(), sheets.faces.len());
     let left = Warning::Left { parts: 2, all: 3 };
-    assert_eq!(without.mended.changes, [left]);
+    assert_eq!(without.mended.changes.last(), Some(&left));
     assert_eq!(without.faces, ball.faces.len());
     assert_eq!(without.vertices, ball.vertices.len());
     assert!(without.rim.is_empty());
