@@ -9,6 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::fft::{Real, lock};
+use crate::fresh::filled;
 use crate::ops::Passes;
 
 /// Bricks per task.
@@ -87,14 +88,15 @@ pub(crate) fn convolve<T: Real>(
     // Passes write by turns to a vector that is kept and to the one that is returned, to which the last one does.
     let mut kept = std::mem::take(&mut *lock(&T::shared().scratch));
     kept.resize(x.len(), T::zero());
-    let mut result = vec![T::zero(); x.len()];
+    let mut result = Vec::new();
     let order = passes.order(axes);
     for (pass, &axis) in order.iter().enumerate() {
         let constants = phase_values.map(|rest| vec![rest; volume]);
-        let (from, to) = if (order.len() - pass).is_multiple_of(2) {
-            (&mut result, &mut kept)
+        let to_kept = (order.len() - pass).is_multiple_of(2);
+        let (from, to) = if to_kept {
+            (&result, &mut kept)
         } else {
-            (&mut kept, &mut result)
+            (&kept, &mut result)
         };
         let pass = Pass {
             x: if pass == 0 { x } else { from },
@@ -107,7 +109,11 @@ pub(crate) fn convolve<T: Real>(
             stride: side.pow((axes - 1 - axis) as u32),
             volume,
         };
-        pass.run(to);
+        if to.is_empty() {
+            *to = pass.made(x.len());
+        } else {
+            pass.run(to);
+        }
         // A constant outside is smoothed like the values inside.
         phase_values = phase_values.map(|rest| rest * sum);
     }
@@ -136,12 +142,22 @@ impl<T: Real> Pass<'_, T> {
     fn run(&self, result: &mut [T]) {
         let arch = Arch::new();
         let groups = result.par_chunks_mut(GROUP * self.volume).enumerate();
-        groups.for_each(|(group, result)| {
-            arch.dispatch(Group {
-                pass: self,
-                first: group * GROUP,
-                result,
-            });
+        groups.for_each(|(group, result)| self.group(arch, group, result));
+    }
+
+    /// The result in a new vector.
+    fn made(&self, len: usize) -> Vec<T> {
+        let arch = Arch::new();
+        filled(len, GROUP * self.volume, |group, result| {
+            self.group(arch, group, result);
+        })
+    }
+
+    fn group(&self, arch: Arch, group: usize, result: &mut [T]) {
+        arch.dispatch(Group {
+            pass: self,
+            first: group * GROUP,
+            result,
         });
     }
 

@@ -2,27 +2,71 @@
 //!
 //! Entries are worked on in blocks that stay in the fastest cache, instruction by instruction.
 
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined is compiled without the instructions that were detected"
+)]
+
 use std::borrow::Cow;
+use std::mem::MaybeUninit;
 
 use burn_backend::{DType, Shape, TensorData};
 use linearize::{Arithmetic, CustomOpIr, Elementwise, Instruction, Output, Right};
+use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::fft::{Real, is_f64};
+use crate::fresh::{PARALLEL_FROM, room, zeroed};
 use crate::slices::sum;
 
 /// Entries per block: a handful of intermediate results fit into the first-level cache.
 const BLOCK: usize = 1 << 10;
 /// Entries per task; sums are taken in this order whatever the number of threads.
 const CHUNK: usize = 1 << 14;
-/// Shorter vectors stay on one thread.
-const PARALLEL_FROM: usize = 1 << 15;
 
 /// Values in either precision.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Values {
     Double(Vec<f64>),
     Single(Vec<f32>),
+}
+
+/// The part of an output that belongs to a task: of memory that was an input's, or new.
+enum Piece<'a> {
+    Double(Part<'a, f64>),
+    Single(Part<'a, f32>),
+}
+
+enum Part<'a, T> {
+    Reused(&'a mut [T]),
+    New(&'a mut [MaybeUninit<T>]),
+}
+
+impl<'a, T: Real> Part<'a, T> {
+    fn all(values: &'a mut Vec<T>, len: usize) -> Vec<Self> {
+        if values.is_empty() {
+            let pieces = room(values, len).chunks_mut(CHUNK);
+            pieces.map(Self::New).collect()
+        } else {
+            values.chunks_mut(CHUNK).map(Self::Reused).collect()
+        }
+    }
+
+    fn entries(self) -> &'a mut [T] {
+        match self {
+            Self::Reused(entries) => entries,
+            Self::New(piece) => zeroed(piece),
+        }
+    }
+}
+
+impl<'a> Piece<'a> {
+    fn target(self) -> Target<'a> {
+        match self {
+            Self::Double(part) => Target::Double(part.entries()),
+            Self::Single(part) => Target::Single(part.entries()),
+        }
+    }
 }
 
 /// Where a block of results goes.
@@ -32,10 +76,11 @@ enum Target<'a> {
 }
 
 impl Values {
-    fn zeros(dtype: DType, len: usize) -> Self {
+    /// Without any, for the values of an output.
+    fn none(dtype: DType) -> Self {
         match dtype {
-            DType::F32 => Self::Single(vec![0.0; len]),
-            _ => Self::Double(vec![0.0; len]),
+            DType::F32 => Self::Single(Vec::new()),
+            _ => Self::Double(Vec::new()),
         }
     }
 
@@ -54,15 +99,41 @@ impl Values {
         }
     }
 
-    fn chunks(&mut self) -> Vec<Target<'_>> {
+    /// The pieces of this many entries: those that are here, or room for them.
+    fn pieces(&mut self, len: usize) -> Vec<Piece<'_>> {
         match self {
-            Self::Double(x) => x.chunks_mut(CHUNK).map(Target::Double).collect(),
-            Self::Single(x) => x.chunks_mut(CHUNK).map(Target::Single).collect(),
+            Self::Double(x) => Part::all(x, len).into_iter().map(Piece::Double).collect(),
+            Self::Single(x) => Part::all(x, len).into_iter().map(Piece::Single).collect(),
+        }
+    }
+
+    /// Takes what was written to the room for its entries.
+    ///
+    /// # Safety
+    /// All [pieces](Self::pieces) of so many entries were written.
+    #[allow(unsafe_code, reason = "the standard library has no safe way")]
+    unsafe fn take_room(&mut self, len: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            match self {
+                Self::Double(x) => x.set_len(len),
+                Self::Single(x) => x.set_len(len),
+            }
         }
     }
 }
 
 impl Target<'_> {
+    /// The entries of a block, which have the type of the program.
+    #[inline(always)]
+    fn entries<T: Real>(&mut self, start: usize, size: usize) -> &mut [T] {
+        match self {
+            Self::Double(x) => bytemuck::cast_slice_mut(&mut x[start..][..size]),
+            Self::Single(x) => bytemuck::cast_slice_mut(&mut x[start..][..size]),
+        }
+    }
+
+    #[inline(always)]
     fn read<T: Real>(&self, start: usize, block: &mut [T]) {
         match self {
             Self::Double(x) => convert(&x[start..], block),
@@ -70,6 +141,7 @@ impl Target<'_> {
         }
     }
 
+    #[inline(always)]
     fn write<T: Real>(&mut self, start: usize, block: &[T]) {
         match self {
             Self::Double(x) => convert(block, &mut x[start..]),
@@ -79,6 +151,7 @@ impl Target<'_> {
 }
 
 /// Copies entries, rounded if needed.
+#[inline(always)]
 fn convert<A: Real, B: Real>(from: &[A], to: &mut [B]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = B::of(from.double());
@@ -110,11 +183,7 @@ fn run<'a, T: Real>(
     dtypes: &[DType],
 ) -> Vec<Values> {
     let len = inputs.iter().map(|input| input.len()).max().unwrap_or(0);
-    let own = if is_f64::<T>() {
-        DType::F64
-    } else {
-        DType::F32
-    };
+    let own = own_type::<T>();
     // Outputs that can take over the memory of an input do.
     let mut results: Vec<Option<Values>> = dtypes.iter().map(|_| None).collect();
     let mut free: Vec<usize> = (program.outputs.iter().zip(dtypes).enumerate())
@@ -135,37 +204,48 @@ fn run<'a, T: Real>(
     let mut results: Vec<Values> = (results.into_iter().zip(&program.outputs).zip(dtypes))
         .map(|((reused, output), dtype)| match (reused, output) {
             (Some(values), _) => values,
-            (None, Output::Values(_)) => Values::zeros(*dtype, len),
-            (None, Output::Sum(_)) => Values::zeros(DType::F64, 0),
+            (None, Output::Values(_)) => Values::none(*dtype),
+            (None, Output::Sum(_)) => Values::none(DType::F64),
         })
         .collect();
     // One task per chunk, with its part of every output.
     let count = len.div_ceil(CHUNK);
-    let mut tasks: Vec<Vec<Option<Target>>> = (0..count).map(|_| Vec::new()).collect();
-    for result in &mut results {
-        let mut chunks = result.chunks().into_iter();
+    let mut tasks: Vec<Vec<Option<Piece>>> = (0..count).map(|_| Vec::new()).collect();
+    for (result, output) in results.iter_mut().zip(&program.outputs) {
+        let pieces = match output {
+            Output::Values(_) => result.pieces(len),
+            Output::Sum(_) => Vec::new(),
+        };
+        let mut pieces = pieces.into_iter();
         for task in &mut tasks {
-            task.push(chunks.next());
+            task.push(pieces.next());
         }
     }
-    let machine = Machine { program, sources };
-    let work = |(chunk, targets): (usize, &mut Vec<Option<Target>>)| {
-        let start = chunk * CHUNK;
-        machine.run(start..len.min(start + CHUNK), targets)
+    let machine = Machine::new(program, sources, dtypes);
+    let arch = Arch::new();
+    let work = |(chunk, pieces): (usize, Vec<Option<Piece>>)| {
+        let (start, pieces) = (chunk * CHUNK, pieces.into_iter());
+        let mut targets: Vec<Option<Target>> =
+            pieces.map(|piece| piece.map(Piece::target)).collect();
+        arch.dispatch(|| machine.run(start..len.min(start + CHUNK), &mut targets))
     };
     let sums: Vec<Vec<f64>> = if len < PARALLEL_FROM {
-        tasks.iter_mut().enumerate().map(work).collect()
+        tasks.into_iter().enumerate().map(work).collect()
     } else {
-        tasks.par_iter_mut().enumerate().map(work).collect()
+        tasks.into_par_iter().enumerate().map(work).collect()
     };
-    drop(tasks);
     for (i, (output, dtype)) in program.outputs.iter().zip(dtypes).enumerate() {
-        if let Output::Sum(_) = output {
-            let total: f64 = sums.iter().map(|sums| sums[i]).sum();
-            results[i] = match dtype {
-                DType::F32 => Values::Single(vec![total as f32]),
-                _ => Values::Double(vec![total]),
-            };
+        match output {
+            Output::Sum(_) => {
+                let total: f64 = sums.iter().map(|sums| sums[i]).sum();
+                results[i] = match dtype {
+                    DType::F32 => Values::Single(vec![total as f32]),
+                    _ => Values::Double(vec![total]),
+                };
+            }
+            #[allow(unsafe_code, reason = "as it says")]
+            // SAFETY: each task made targets of its pieces, which writes all of them.
+            Output::Values(_) => unsafe { results[i].take_room(len) },
         }
     }
     results
@@ -174,10 +254,53 @@ fn run<'a, T: Real>(
 struct Machine<'a, T: Clone> {
     program: &'a Elementwise,
     sources: Vec<Source<'a, T>>,
+    /// The output into which an instruction computes, if nothing else reads its result.
+    direct: Vec<Option<usize>>,
+}
+
+impl<'a, T: Real> Machine<'a, T> {
+    fn new(program: &'a Elementwise, sources: Vec<Source<'a, T>>, dtypes: &[DType]) -> Self {
+        let own = own_type::<T>();
+        let reused = |output: usize| {
+            let mut sources = sources.iter();
+            sources.any(|source| matches!(source, Source::Reused(other) if *other == output))
+        };
+        let direct = |number: usize| {
+            let result = sources.len() + number;
+            let instructions = program.instructions.iter();
+            let reads = instructions.map(|instruction| {
+                let right = matches!(instruction.right, Right::Operand(right) if right == result);
+                usize::from(instruction.left == result || right)
+            });
+            let of = |output: &Output| match *output {
+                Output::Values(operand) | Output::Sum(operand) => operand == result,
+            };
+            let mut outputs = (program.outputs.iter().enumerate()).filter(|(_, output)| of(output));
+            let (output, kind) = outputs.next()?;
+            let alone = outputs.next().is_none() && reads.sum::<usize>() == 0;
+            let is_values = matches!(kind, Output::Values(_)) && dtypes[output] == own;
+            (alone && is_values && !reused(output)).then_some(output)
+        };
+        Self {
+            direct: (0..program.instructions.len()).map(direct).collect(),
+            program,
+            sources,
+        }
+    }
+}
+
+/// The float type of a program.
+fn own_type<T: Real>() -> DType {
+    if is_f64::<T>() {
+        DType::F64
+    } else {
+        DType::F32
+    }
 }
 
 impl<T: Real> Machine<'_, T> {
     /// Runs the program on some entries; returns the sums by output, zero for other outputs.
+    #[inline(always)]
     fn run(&self, entries: std::ops::Range<usize>, targets: &mut [Option<Target>]) -> Vec<f64> {
         let inputs = self.sources.len();
         let block = BLOCK.min(entries.len());
@@ -201,25 +324,37 @@ impl<T: Real> Machine<'_, T> {
             for (number, instruction) in self.program.instructions.iter().enumerate() {
                 let (before, rest) = registers.split_at_mut((inputs + number) * block);
                 let operand = |i: usize| self.operand(i, before, block, start, size);
-                compute(instruction, &mut rest[..size], operand);
+                let direct = self.direct[number].and_then(|output| targets[output].as_mut());
+                let result = match direct {
+                    Some(target) => target.entries(within, size),
+                    None => &mut rest[..size],
+                };
+                compute(instruction, result, operand);
             }
             for (output, (target, total)) in
                 (self.program.outputs.iter()).zip(targets.iter_mut().zip(&mut sums))
             {
                 match (output, target) {
-                    (Output::Values(i), Some(target)) => {
+                    (Output::Values(i), Some(target)) if !self.is_direct(*i) => {
                         target.write(within, self.operand(*i, &registers, block, start, size));
                     }
                     (Output::Sum(i), _) => {
                         *total += sum(self.operand(*i, &registers, block, start, size));
                     }
-                    (Output::Values(_), None) => {}
+                    (Output::Values(_), _) => {}
                 }
             }
         }
         sums
     }
 
+    /// Whether an operand was computed into its output.
+    fn is_direct(&self, operand: usize) -> bool {
+        let instruction = operand.checked_sub(self.sources.len());
+        instruction.is_some_and(|number| self.direct[number].is_some())
+    }
+
+    #[inline(always)]
     fn operand<'b>(
         &'b self,
         i: usize,
@@ -235,6 +370,7 @@ impl<T: Real> Machine<'_, T> {
     }
 }
 
+#[inline(always)]
 fn compute<'a, T: Real>(
     instruction: &Instruction,
     result: &mut [T],

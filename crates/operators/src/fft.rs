@@ -51,12 +51,15 @@ pub(crate) struct CachedSymbol<T: Real> {
 macro_rules! real {
     ($type:ty) => {
         impl Real for $type {
+            #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $type
             }
+            #[inline(always)]
             fn double(self) -> f64 {
                 self.into()
             }
+            #[inline(always)]
             fn truncated(self) -> usize {
                 // A 32-bit conversion is one instruction, a 64-bit unsigned one is not.
                 (self as i32).max(0) as usize

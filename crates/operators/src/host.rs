@@ -165,7 +165,9 @@ impl<B: Host> VectorOps for B {
                 let (a, b) = (T::of(a), T::of(b));
                 slices::zip_apply(x, y, |x, y| a * x + b * y);
             }),
-            Motion::Retracted(t) => mapped::<B>(x, y, |u, p| profile::retracted(u, t * p)),
+            Motion::Retracted(t) => {
+                changed!(x, y, |x: &mut [T], y| profile::retract_values(x, y, t))
+            }
             Motion::Extrapolated(factor) => mapped::<B>(x, y, |u, previous| {
                 profile::extrapolated(u, previous, factor)
             }),

@@ -62,6 +62,7 @@ mod elementwise;
 mod error;
 mod fft;
 mod filter;
+mod fresh;
 #[macro_use]
 mod host;
 mod interpolation;

@@ -1,7 +1,15 @@
 //! Moves that respect the interface profile, value by value and as Burn operations.
 #![cfg_attr(not(any(feature = "wgpu", feature = "cuda")), allow(dead_code))]
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined is compiled without the instructions that were detected"
+)]
 
 use burn::tensor::Tensor;
+use pulp::Arch;
+
+use crate::fft::Real;
+use crate::slices::over_chunks;
 
 /// Width of the transition between the two variables, in units of `1 - u^2`.
 const WINDOW: f64 = 0.05;
@@ -11,25 +19,72 @@ const LARGEST_SHIFT: f64 = 1.5;
 const LARGEST_EXTRAPOLATION: f64 = 0.9;
 /// Extrapolation leaves what is nearer to a pure phase than this alone.
 const PHASE: f64 = 0.99999;
-/// Below this `tanh x = x` in double precision.
-const LINEAR: f64 = 1e-8;
+/// Up to here the rest of the series of `tanh x` is below `1e-17 x`.
+const SMALL: f64 = 0.03;
+/// Values that are moved together.
+const TOGETHER: usize = 16;
 
 /// The hyperbolic translation `(u + s) / (1 + u s)`: adds `atanh s` to `atanh u`.
+#[inline(always)]
 fn translated(u: f64, s: f64) -> f64 {
     (u + s) / (1.0 + u * s)
 }
 
-pub(crate) fn retracted(u: f64, motion: f64) -> f64 {
-    let phase = u.clamp(-1.0, 1.0);
+/// Moves values of a phase field by `factor p`, see [`crate::retract`].
+pub(crate) fn retract_values<T: Real>(u: &mut [T], p: &[T], factor: f64) {
+    let arch = Arch::new();
+    over_chunks(u, p, &|u, p| arch.dispatch(|| retract_block(u, p, factor)));
+}
+
+/// A few at once, so that all but the hyperbolic tangents of long shifts is done in vector registers.
+#[inline(always)]
+fn retract_block<T: Real>(u: &mut [T], p: &[T], factor: f64) {
+    for (u, p) in u.chunks_mut(TOGETHER).zip(p.chunks(TOGETHER)) {
+        let mut block = [[0.0; TOGETHER]; 3];
+        let [values, motions, shifts] = &mut block;
+        for (k, (u, p)) in u.iter().zip(p).enumerate() {
+            (values[k], motions[k]) = (u.double(), factor * p.double());
+        }
+        for k in 0..TOGETHER {
+            shifts[k] = shift(values[k], motions[k]);
+        }
+        let mut tangents = shifts.map(tanh_of_small);
+        for (tangent, shift) in tangents.iter_mut().zip(shifts.iter()) {
+            if shift.abs() > SMALL {
+                *tangent = shift.tanh();
+            }
+        }
+        let mut moved = [0.0; TOGETHER];
+        for k in 0..TOGETHER {
+            moved[k] = retracted(values[k], motions[k], shifts[k], tangents[k]);
+        }
+        for (u, moved) in u.iter_mut().zip(moved) {
+            *u = T::of(moved);
+        }
+    }
+}
+
+/// The shift of `atanh u` for a motion.
+#[inline(always)]
+fn shift(u: f64, motion: f64) -> f64 {
     let q = (1.0 - u * u).max(0.0);
     let shift = motion * q / (q * q + WINDOW * WINDOW);
-    let shift = shift.clamp(-LARGEST_SHIFT, LARGEST_SHIFT);
-    let s = if shift.abs() < LINEAR {
-        shift
-    } else {
-        shift.tanh()
-    };
-    u + (translated(phase, s) - phase) + (motion - q * shift)
+    shift.clamp(-LARGEST_SHIFT, LARGEST_SHIFT)
+}
+
+/// The moved value, where the shift has this hyperbolic tangent.
+#[inline(always)]
+fn retracted(u: f64, motion: f64, shift: f64, tangent: f64) -> f64 {
+    let (phase, q) = (u.clamp(-1.0, 1.0), (1.0 - u * u).max(0.0));
+    u + (translated(phase, tangent) - phase) + (motion - q * shift)
+}
+
+/// `tanh x` by its series up to `x^9`, to rounding as far as [`SMALL`].
+#[inline(always)]
+fn tanh_of_small(x: f64) -> f64 {
+    let y = x * x;
+    let rest = 17.0 / 315.0 - y * (62.0 / 2835.0);
+    x - x * y * (1.0 / 3.0 - y * (2.0 / 15.0 - y * rest))
 }
 
 pub(crate) fn extrapolated(u: f64, previous: f64, factor: f64) -> f64 {

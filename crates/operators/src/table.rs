@@ -5,14 +5,12 @@
 //! ends, so it is twice continuously differentiable, with an error of `width^6 / 46080 max |F^(6)|`. Beyond the ends it
 //! continues as the second-order Taylor polynomial there.
 
-use rayon::prelude::*;
-
 use crate::Error;
 use crate::fft::Real;
+use crate::fresh::filled;
 
 /// Coefficients per cell.
 pub const COEFFICIENTS: usize = 6;
-const PARALLEL_FROM: usize = 1 << 15;
 const CHUNK: usize = 1 << 13;
 
 /// Interval and resolution of a table; the coefficients travel beside it as a `[cells, 6]` tensor.
@@ -230,14 +228,9 @@ fn evaluate_order<T: Real, const ORDER: usize>(
     coefficients: &[T],
 ) -> Vec<T> {
     let table = Evaluator::<T, ORDER>::new(range, coefficients);
-    let mut result = vec![T::zero(); w.len()];
-    if w.len() < PARALLEL_FROM {
-        table.fill(w, &mut result);
-    } else {
-        let chunks = result.par_chunks_mut(CHUNK).zip(w.par_chunks(CHUNK));
-        chunks.for_each(|(out, w)| table.fill(w, out));
-    }
-    result
+    filled(w.len(), CHUNK, |number, out| {
+        table.fill(&w[number * CHUNK..], out);
+    })
 }
 
 #[cfg(test)]
