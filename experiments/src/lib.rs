@@ -34,6 +34,7 @@ pub mod products;
 pub mod programs;
 pub mod segmentations;
 pub mod session;
+pub mod shares;
 pub mod smoothing;
 pub mod step_table;
 pub mod storages;

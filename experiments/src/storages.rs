@@ -94,8 +94,7 @@ impl StorageOptions {
 
     /// Lets the cross flow on bricks, and then the armadillo on both storages at every resolution.
     pub fn measure(&self, session: &mut Session) -> Result<Vec<Measured>> {
-        let steps = |usual| session.options.either(QUICK_STEPS, usual);
-        let [steps, cross_steps] = [STEPS, CROSS_STEPS].map(steps);
+        let cross_steps = session.options.either(QUICK_STEPS, CROSS_STEPS);
         let [curves, surfaces] = self.cells(&session.options);
         let mut measured = Vec::new();
         let forget_memory = || {
@@ -113,27 +112,33 @@ impl StorageOptions {
             let case = Case::willmore(CROSS.key, initial, operator, scales, rule, count);
             measured.push(Measured::new(CROSS.key, n, Storage::Bricks, case, session)?);
         }
-        let operator = Chosen::default().learned(Formulation::Accurate, &needed_network())?;
         for n in surfaces {
             for storage in STORAGES {
                 if storage == Storage::Dense && n > self.dense_up_to {
                     continue;
                 }
                 forget_memory();
-                let (grid, mesh) = self.mesh(&session.options, n)?;
-                let (title, scales) = (mesh.title.clone(), scales(n));
-                let distances = format!("{title}, n = {n}, {storage}: signed distance");
-                let initial = session.phase(distances, |stage| {
-                    mesh.phase_field(grid, scales.eps, &stage.bar)
-                })?;
-                drop(mesh);
-                let first = FIRST_STEP * grid.spacing().powi(4);
-                let (operator, rule) = (operator.clone(), StepRule::Doubling(first));
-                let case = Case::willmore(&title, initial, operator, scales, rule, steps);
+                let case = self.surface(session, n, storage)?;
                 measured.push(Measured::new("armadillo", n, storage, case, session)?);
             }
         }
         Ok(measured)
+    }
+
+    /// The flow of the armadillo.
+    pub fn surface(&self, session: &mut Session, n: usize, storage: Storage) -> Result<Case<3>> {
+        let (grid, mesh) = self.mesh(&session.options, n)?;
+        let (title, scales) = (mesh.title.clone(), scales(n));
+        let distances = format!("{title}, n = {n}, {storage}: signed distance");
+        let initial = session.phase(distances, |stage| {
+            mesh.phase_field(grid, scales.eps, &stage.bar)
+        })?;
+        let rule = StepRule::Doubling(FIRST_STEP * grid.spacing().powi(4));
+        let operator = Chosen::default().learned(Formulation::Accurate, &needed_network())?;
+        let steps = session.options.either(QUICK_STEPS, STEPS);
+        let mut case = Case::willmore(&title, initial, operator, scales, rule, steps);
+        case.operator.storage = storage;
+        Ok(case)
     }
 }
 

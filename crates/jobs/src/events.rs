@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use pages::five_digits;
 use runs::Interrupt;
@@ -25,6 +26,10 @@ pub trait Watcher: Sync {
     /// The run of a job is stored in a folder from now on, and can be resumed from there; its result goes to a file besides.
     fn stores(&self, _command: &'static str, _folder: &Path, _save: Option<&Path>) {}
 
+    /// A part of the job took so long: one of [`PARTS`], or of the flow one of [`solver::PhaseTimes::PARTS`]. A part is told each time that
+    /// it is over. By default nobody is told.
+    fn spent(&self, _part: &'static str, _seconds: f64) {}
+
     /// The flag that ends the steps of a flow, and drops the one that is being made; asked for before the first step.
     ///
     /// # Errors
@@ -32,6 +37,43 @@ pub trait Watcher: Sync {
     fn interrupt(&self) -> Result<Interrupt, runs::Error> {
         Ok(Interrupt::never())
     }
+}
+
+/// Parts of a job besides those of the flow that [`Watcher::spent`] tells.
+///
+/// - `input`: all that is read and made of the input, `signed distances` among it.
+/// - `preparation`: from there to the first step; the folder of the run is made.
+/// - `other work of steps`: what the parts of the flow leave of minimizations.
+/// - `measures`: what is done between minimizations: lengths of motions, stop rules, topology, checkpoints.
+/// - `output`: all that is made of the end, `surface` and `pictures` among it.
+/// - `page`: the page for the browser.
+pub const PARTS: [&str; 9] = [
+    INPUT,
+    DISTANCES,
+    PREPARATION,
+    OTHER_OF_STEPS,
+    MEASURES,
+    OUTPUT,
+    SURFACE,
+    PICTURES,
+    PAGE,
+];
+pub(crate) const INPUT: &str = "input";
+pub(crate) const DISTANCES: &str = "signed distances";
+pub(crate) const PREPARATION: &str = "preparation";
+pub(crate) const OTHER_OF_STEPS: &str = "other work of steps";
+pub(crate) const MEASURES: &str = "measures";
+pub(crate) const OUTPUT: &str = "output";
+pub(crate) const SURFACE: &str = "surface";
+pub(crate) const PICTURES: &str = "pictures";
+pub(crate) const PAGE: &str = "page";
+
+/// Tells a watcher how long some work took.
+pub(crate) fn timed<T>(watcher: &dyn Watcher, part: &'static str, work: impl FnOnce() -> T) -> T {
+    let clock = Instant::now();
+    let result = work();
+    watcher.spent(part, clock.elapsed().as_secs_f64());
+    result
 }
 
 /// A watcher that tells nothing.

@@ -6,7 +6,7 @@ use images::{Outline, Side, Tones};
 use surfaces::shapes::{self, BuiltIn};
 use surfaces::{Mended, Repaired, hausdorff_distance};
 
-use crate::events::{GridDistance, Loss, ThinParts};
+use crate::events::{DISTANCES, GridDistance, Loss, ThinParts, timed};
 use crate::file::{File, Input};
 use crate::options::{FieldKind, InputOptions, Inside};
 use crate::own::{OwnMesh, thinnest};
@@ -817,13 +817,15 @@ impl<'a> Reader<'a> {
         let progress = self.watcher.begins("signed distance", grid.cells() as u64);
         let layer_done = || progress.advance();
         let reach = PURE_BEYOND * eps;
-        let distance = if self.takes_bricks {
-            // Bricks are stored if a cell in them is so near to one beside the surface.
-            let near = solver::BRICK_REACH * eps + 2.0 * grid.spacing();
-            distance.sample_near(near, reach, grid, &layer_done)?
-        } else {
-            distance.sample_within(reach, grid, &layer_done)?
-        };
+        let distance = timed(self.watcher, DISTANCES, || {
+            if self.takes_bricks {
+                // Bricks are stored if a cell in them is so near to one beside the surface.
+                let near = solver::BRICK_REACH * eps + 2.0 * grid.spacing();
+                distance.sample_near(near, reach, grid, &layer_done)
+            } else {
+                distance.sample_within(reach, grid, &layer_done)
+            }
+        })?;
         drop(progress);
         let (distance, nodes) = surfaces::mend_signs(distance);
         if nodes > 0 {

@@ -66,7 +66,7 @@ mod words;
 pub use case::check_eps_over_h;
 pub use check::{Check, Checked, Finding, check};
 pub use error::{Error, Result};
-pub use events::{GridDistance, Loss, Note, Progress, Silent, ThinParts, Warning, Watcher};
+pub use events::{GridDistance, Loss, Note, PARTS, Progress, Silent, ThinParts, Warning, Watcher};
 pub use faired::MeshReport;
 pub use file::Input;
 pub use functions::{LabelSurface, fair, flow, inpaint, mcf, repair, surfaces_of_labels};

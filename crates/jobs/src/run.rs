@@ -8,9 +8,9 @@ use std::time::Instant;
 use engine::{Checkpoints, Event, Observer, Store, energy_increases, estimated_time_error};
 use files::FileSystem as _;
 use geometry::measure::touches_side;
-use solver::StepEstimates;
+use solver::{PhaseTimes, StepEstimates};
 
-use crate::events::Progress;
+use crate::events::{MEASURES, OTHER_OF_STEPS, OUTPUT, PAGE, PICTURES, Progress, SURFACE, timed};
 use crate::faired::{Faired, MeshReport};
 use crate::made::{Made, Shape};
 use crate::notes::{About, NetworkNote, RunNotes};
@@ -76,13 +76,15 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         let seconds = clock.elapsed().as_secs_f64();
         let mut summary = None;
         if ended {
-            summary = Some(self.finish(store, &run)?);
+            let finish = || self.finish(store, &run);
+            summary = Some(timed(self.watcher, OUTPUT, finish)?);
         } else {
             drop(store);
         }
         let page = (!self.options.no_page).then(|| folder.join(presentation::PAGE));
         if page.is_some() {
-            page::write(&RunDirectory::open(&folder)?)?;
+            let write = || page::write(&RunDirectory::open(&folder)?);
+            timed(self.watcher, PAGE, write)?;
         }
         Ok(Outcome {
             command: self.command,
@@ -156,7 +158,26 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             topology: None,
         };
         let observers: &mut [&mut dyn Observer<D>] = &mut [&mut steps, &mut pictures];
-        Ok(run.advance(store, observers, &interrupt)?.is_some())
+        let (clock, before) = (Instant::now(), run.records().len());
+        let ended = run.advance(store, observers, &interrupt)?;
+        self.tell_times(&run.records()[before..], clock.elapsed().as_secs_f64());
+        Ok(ended.is_some())
+    }
+
+    /// Tells where the time of some steps went.
+    fn tell_times(&self, made: &[Record], seconds: f64) {
+        let mut steps = 0.0;
+        let mut times = PhaseTimes::default();
+        for made in engine::minimizations(made) {
+            (steps, times) = (steps + made.seconds, times + made.times);
+        }
+        let mut named = 0.0;
+        for (part, seconds) in times.parts() {
+            self.watcher.spent(part, seconds);
+            named += seconds;
+        }
+        self.watcher.spent(OTHER_OF_STEPS, steps - named);
+        self.watcher.spent(MEASURES, seconds - steps);
     }
 
     fn finish(&self, mut store: Store, run: &Run<D>) -> Result<Summary> {
@@ -173,11 +194,12 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         // What has vanished leaves no shape behind.
         let (mut faired, mut topology) = (None, Topology::default());
         if has_interface(u) {
-            faired = presentation.faired(start, u, eps)?;
+            let make = || presentation.faired(start, u, eps);
+            faired = timed(self.watcher, SURFACE, make)?;
         }
         self.write(run, faired.as_ref(), presentation::FINAL, directory)?;
         if has_interface(u) {
-            topology = presentation.topology(u)?;
+            topology = timed(self.watcher, SURFACE, || presentation.topology(u))?;
             if let Some(path) = &self.save {
                 self.save(u, eps, faired.as_ref(), path)?;
             }
@@ -256,14 +278,14 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         let u = run.stored();
         if has_interface(u) {
             let (start, eps) = (&run.case().initial, run.case().scales.eps);
-            let (picture, figure) = rayon::join(
-                || -> Result<Vec<u8>> { Ok(self.presentation.picture(start, u, eps)?.to_png()?) },
-                || {
-                    faired.map(|faired| -> Result<String> {
-                        Ok(faired.displacement.figure()?.to_svg()?)
-                    })
-                },
-            );
+            let of_shape =
+                || -> Result<Vec<u8>> { Ok(self.presentation.picture(start, u, eps)?.to_png()?) };
+            let of_displacement = || {
+                faired
+                    .map(|faired| -> Result<String> { Ok(faired.displacement.figure()?.to_svg()?) })
+            };
+            let draw = || rayon::join(of_shape, of_displacement);
+            let (picture, figure) = timed(self.watcher, PICTURES, draw);
             directory.write_file(&format!("{stem}.png"), &picture?)?;
             if let Some(figure) = figure.transpose()? {
                 directory.write_file(presentation::DISPLACEMENT, figure.as_bytes())?;

@@ -3,7 +3,7 @@
 use engine::{Flow, Storage, Store};
 
 use crate::case::with_round_edges;
-use crate::events::Silent;
+use crate::events::{INPUT, PREPARATION, Silent, timed};
 use crate::input::{InitialShape, Loaded, Opened, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
@@ -112,7 +112,7 @@ pub fn run_and_save(mut job: Job, file: &Path, watcher: &dyn Watcher) -> Result<
 }
 
 fn start(job: Job, save: Option<&Path>, watcher: &dyn Watcher) -> Result<Outcome> {
-    let (session, loaded) = Session::load(job, save, watcher)?;
+    let (session, loaded) = timed(watcher, INPUT, || Session::load(job, save, watcher))?;
     match loaded {
         Loaded::Plane(start) => session.start(start),
         Loaded::Space(start) => session.start(start),
@@ -309,6 +309,16 @@ impl<'a> Session<'a> {
         mut self,
         start: InitialShape<D, O>,
     ) -> Result<Outcome> {
+        let watcher = self.watcher;
+        let (plan, store, run) = timed(watcher, PREPARATION, || self.stored(start))?;
+        plan.go_on(store, run)
+    }
+
+    /// A run at its beginning, in its folder.
+    fn stored<const D: usize, O: Presentation<D>>(
+        &mut self,
+        start: InitialShape<D, O>,
+    ) -> Result<(Plan<'a, D, O>, Store, Run<D>)> {
         self.save.as_deref().map_or(Ok(()), O::check_saved)?;
         let (case, presentation) = self.prepare(start)?;
         let options = self.options_to_store()?;
@@ -326,7 +336,7 @@ impl<'a> Session<'a> {
         let mut files = vec![(settings::FILE, options.as_bytes())];
         files.extend(inputs.iter().map(|(name, bytes)| (&**name, &bytes[..])));
         let store = Store::create(folder, &files, &run, notes, plan.checkpoints())?;
-        plan.go_on(store, run)
+        Ok((plan, store, run))
     }
 
     /// The options of which the same run can be made again.

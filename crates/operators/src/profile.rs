@@ -19,8 +19,8 @@ const LARGEST_SHIFT: f64 = 1.5;
 const LARGEST_EXTRAPOLATION: f64 = 0.9;
 /// Extrapolation leaves what is nearer to a pure phase than this alone.
 const PHASE: f64 = 0.99999;
-/// Up to here the rest of the series of `tanh x` is below `1e-17 x`.
-const SMALL: f64 = 0.03;
+/// Below this `tanh x = x` in double precision.
+const LINEAR: f64 = 1e-8;
 /// Values that are moved together.
 const TOGETHER: usize = 16;
 
@@ -36,7 +36,7 @@ pub(crate) fn retract_values<T: Real>(u: &mut [T], p: &[T], factor: f64) {
     over_chunks(u, p, &|u, p| arch.dispatch(|| retract_block(u, p, factor)));
 }
 
-/// A few at once, so that all but the hyperbolic tangents of long shifts is done in vector registers.
+/// A few at once, so that all but the hyperbolic tangents is done in vector registers.
 #[inline(always)]
 fn retract_block<T: Real>(u: &mut [T], p: &[T], factor: f64) {
     for (u, p) in u.chunks_mut(TOGETHER).zip(p.chunks(TOGETHER)) {
@@ -48,10 +48,10 @@ fn retract_block<T: Real>(u: &mut [T], p: &[T], factor: f64) {
         for k in 0..TOGETHER {
             shifts[k] = shift(values[k], motions[k]);
         }
-        let mut tangents = shifts.map(tanh_of_small);
-        for (tangent, shift) in tangents.iter_mut().zip(shifts.iter()) {
-            if shift.abs() > SMALL {
-                *tangent = shift.tanh();
+        let mut tangents = *shifts;
+        for tangent in &mut tangents {
+            if tangent.abs() >= LINEAR {
+                *tangent = tangent.tanh();
             }
         }
         let mut moved = [0.0; TOGETHER];
@@ -77,14 +77,6 @@ fn shift(u: f64, motion: f64) -> f64 {
 fn retracted(u: f64, motion: f64, shift: f64, tangent: f64) -> f64 {
     let (phase, q) = (u.clamp(-1.0, 1.0), (1.0 - u * u).max(0.0));
     u + (translated(phase, tangent) - phase) + (motion - q * shift)
-}
-
-/// `tanh x` by its series up to `x^9`, to rounding as far as [`SMALL`].
-#[inline(always)]
-fn tanh_of_small(x: f64) -> f64 {
-    let y = x * x;
-    let rest = 17.0 / 315.0 - y * (62.0 / 2835.0);
-    x - x * y * (1.0 / 3.0 - y * (2.0 / 15.0 - y * rest))
 }
 
 pub(crate) fn extrapolated(u: f64, previous: f64, factor: f64) -> f64 {

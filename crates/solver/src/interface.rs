@@ -58,20 +58,20 @@ type Inverse = Box<dyn Fn(&mut [f64]) + Send + Sync>;
 type Local = [[f64; MOST_CORNERS]; MOST_CORNERS];
 
 impl<const D: usize> InterfaceModes<D> {
-    /// The correction for the interface of `u`, whose values lie at some nodes of the grid, or none if there is no interface, or
-    /// one with corners.
-    ///
-    /// With a `region` only its nodes count.
-    pub(crate) fn new(
+    /// The interface of `u`, whose values lie at some nodes of the grid; with a `region` only its nodes count.
+    pub(crate) fn samples(
         nodes: &Nodes<D>,
         u: &[f64],
         eps: f64,
-        tau: f64,
         stiffness: f64,
         region: Option<&[bool]>,
-    ) -> Option<Self> {
+    ) -> Option<Samples<D>> {
         let window = (CUT / stiffness.sqrt()).clamp(LEAST, WINDOW);
-        let samples = Samples::new(nodes, u, eps, SPACING * eps, window, region)?;
+        Samples::new(nodes, u, eps, SPACING * eps, window, region)
+    }
+
+    /// The correction for an interface of width `eps`, or none if there is no interface, or one with corners.
+    pub(crate) fn on(nodes: &Nodes<D>, samples: Samples<D>, eps: f64, tau: f64) -> Option<Self> {
         let inner = samples.nodes.iter().filter(|s| s.weight >= WINDOW);
         let sharp = (inner.clone()).filter(|s| s.curvature.abs() * eps > 1.0);
         let corners_dominate = sharp.count() as f64 > SHARP * inner.count() as f64;
@@ -249,6 +249,15 @@ mod tests {
 
     const EPS: f64 = 1.0 / 32.0;
 
+    impl<const D: usize> InterfaceModes<D> {
+        /// Where `c = 1`.
+        fn new(grid: Grid<D>, u: &[f64], tau: f64) -> Option<Self> {
+            let nodes = grid.into();
+            let samples = Self::samples(&nodes, u, EPS, 1.0, None)?;
+            Self::on(&nodes, samples, EPS, tau)
+        }
+    }
+
     fn disc(grid: &Grid<2>) -> Vec<f64> {
         let ball = Ball::new([0.0, 0.0], 0.3).unwrap();
         phase_field(*grid, &ball, EPS).unwrap().into_values()
@@ -298,7 +307,7 @@ mod tests {
         let grid = Grid::<2>::centred(96, 1.0).unwrap();
         let u = disc(&grid);
         let tau = 2e-5;
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, tau, 1.0, None).unwrap();
+        let modes = InterfaceModes::new(grid, &u, tau).unwrap();
         for k in [0.0_f64, 2.0, 5.0] {
             let p = wave(&grid, &u, k);
             let mut z = vec![0.0; p.len()];
@@ -319,7 +328,7 @@ mod tests {
     fn the_correction_is_symmetric_and_not_negative() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let u = disc(&grid);
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, 1.0, None).unwrap();
+        let modes = InterfaceModes::new(grid, &u, 1e-4).unwrap();
         let vector = |a: f64| -> Vec<f64> {
             (0..u.len())
                 .map(|i| (a * i as f64).sin() + 0.2 * (a * a * i as f64).cos())
@@ -341,7 +350,7 @@ mod tests {
         let grid = Grid::<D>::centred(cells, 1.0).unwrap();
         let ball = Ball::new([0.0; D], 0.3).unwrap();
         let u = phase_field(grid, &ball, EPS).unwrap().into_values();
-        let modes = InterfaceModes::new(&grid.into(), &u, EPS, 1e-4, 1.0, None).unwrap();
+        let modes = InterfaceModes::new(grid, &u, 1e-4).unwrap();
         let r: Vec<f64> = (0..u.len()).map(|i| (0.37 * i as f64).sin()).collect();
         let (mut expected, mut found) = (r.clone(), r.clone());
         modes.update(&r, &mut expected);
@@ -388,9 +397,9 @@ mod tests {
     fn nothing_is_corrected_without_an_interface_or_at_corners() {
         let grid = Grid::<2>::centred(64, 1.0).unwrap();
         let flat = vec![1.0; grid.len()];
-        assert!(InterfaceModes::new(&grid.into(), &flat, EPS, 1e-4, 1.0, None).is_none());
+        assert!(InterfaceModes::new(grid, &flat, 1e-4).is_none());
         let square = Cuboid::new([0.3, 0.3]).unwrap();
         let square = phase_field(grid, &square, EPS).unwrap();
-        assert!(InterfaceModes::new(&grid.into(), square.values(), EPS, 1e-4, 1.0, None).is_none());
+        assert!(InterfaceModes::new(grid, square.values(), 1e-4).is_none());
     }
 }

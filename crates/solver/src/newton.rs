@@ -306,7 +306,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         let times = &self.times;
         let precondition = |r: &Tensor<D>| {
             let apply = || match preconditioner {
-                Some(preconditioner) => preconditioner.apply(r, level),
+                Some(preconditioner) => preconditioner.apply(r, level, times),
                 None => r.clone(),
             };
             timed(times, |t| &mut t.preconditioner, apply)
@@ -442,7 +442,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 iterations: self.params.cg_iterations,
             };
             if let Some(preconditioner) = &mut self.preconditioner {
-                let follow = || preconditioner.follow(&point.u, self.device);
+                let follow = || preconditioner.follow(&point.u, self.device, &self.times);
                 timed(&self.times, |t| &mut t.assembly, follow)?;
             }
             let solution = self.solve(&point, limits, Level::Both)?;

@@ -1,5 +1,7 @@
 //! Preconditioners of the linear solves.
 
+use std::cell::Cell;
+
 use burn::tensor::Tensor;
 use geometry::Nodes;
 use mean_curvature::PhaseInverse;
@@ -8,6 +10,7 @@ use operators::{ComputeDevice, SharedUpdate, update_on_host};
 use crate::Error;
 use crate::interface::InterfaceModes;
 use crate::region::Region;
+use crate::times::{PhaseTimes, timed};
 
 /// Which parts of the preconditioner.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -34,20 +37,29 @@ pub(crate) struct Preconditioner<const D: usize> {
 
 impl<const D: usize> Preconditioner<D> {
     /// Moves the coarse correction to the interface of `u`.
-    pub(crate) fn follow(&mut self, u: &Tensor<D>, device: &ComputeDevice) -> Result<(), Error> {
+    pub(crate) fn follow(
+        &mut self,
+        u: &Tensor<D>,
+        device: &ComputeDevice,
+        times: &Cell<PhaseTimes>,
+    ) -> Result<(), Error> {
         let u = device.values(u.clone())?;
         let region = self.region.as_ref().map(|region| &*region.marks);
-        let modes =
-            InterfaceModes::new(&self.nodes, &u, self.eps, self.tau, self.stiffness, region);
+        let find = || InterfaceModes::samples(&self.nodes, &u, self.eps, self.stiffness, region);
+        let samples = timed(times, |t| &mut t.samples, find);
+        let modes = samples
+            .and_then(|samples| InterfaceModes::on(&self.nodes, samples, self.eps, self.tau));
         self.interface = modes.map(SharedUpdate::new);
         Ok(())
     }
 
     /// Applies it, in the precision of `r`.
-    pub(crate) fn apply(&self, r: &Tensor<D>, level: Level) -> Tensor<D> {
+    pub(crate) fn apply(&self, r: &Tensor<D>, level: Level, times: &Cell<PhaseTimes>) -> Tensor<D> {
         let z = (self.phase)(r);
         let z = match &self.interface {
-            Some(interface) if level == Level::Both => update_on_host(r, z, interface),
+            Some(interface) if level == Level::Both => {
+                timed(times, |t| &mut t.coarse, || update_on_host(r, z, interface))
+            }
             _ => z,
         };
         Region::project(self.region.as_ref(), z)

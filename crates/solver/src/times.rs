@@ -13,14 +13,45 @@ use serde::{Deserialize, Serialize};
 pub struct PhaseTimes {
     /// Hessian-vector products.
     pub products: f64,
-    /// Applications of the preconditioner.
+    /// Applications of the preconditioner,
     pub preconditioner: f64,
-    /// Assembly of its coarse correction.
+    /// and of these what its coarse correction takes.
+    pub coarse: f64,
+    /// Assembly of the coarse correction,
     pub assembly: f64,
+    /// and of this the search for the nodes of the interface with their normals and curvatures.
+    pub samples: f64,
     /// Energies and gradients.
     pub energies: f64,
     /// Minimizations on coarser grids that find the start.
     pub start: f64,
+}
+
+impl PhaseTimes {
+    /// The names of [`Self::parts`].
+    pub const PARTS: [&'static str; 7] = [
+        "products",
+        "inverse in the pure phases",
+        "coarse correction",
+        "samples of the interface",
+        "factorization",
+        "energies and gradients",
+        "starts on coarser grids",
+    ];
+
+    /// The times without overlap.
+    pub fn parts(&self) -> [(&'static str, f64); 7] {
+        let seconds = [
+            self.products,
+            self.preconditioner - self.coarse,
+            self.coarse,
+            self.samples,
+            self.assembly - self.samples,
+            self.energies,
+            self.start,
+        ];
+        std::array::from_fn(|k| (Self::PARTS[k], seconds[k]))
+    }
 }
 
 /// Adds the wall time of some work to that of a phase.

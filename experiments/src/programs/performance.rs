@@ -1,6 +1,6 @@
 use crate::prelude::*;
 use crate::storages::{self, StorageOptions};
-use crate::{products, surfaces, timing};
+use crate::{products, shares, surfaces, timing};
 use geometry::shapes::Capsule;
 use runs::Interrupt;
 
@@ -28,6 +28,17 @@ pub const EXPERIMENT: Experiment = Experiment {
             options: Some(""),
         },
         ResultFolder {
+            name: "time_shares",
+            title: "Where the time goes",
+            description: "Not in the paper: the parts of the time of a step and of the whole of `willmore fair`, and how near products are to \
+                 what the memory allows.",
+            figures: &[(
+                "shares",
+                "Parts of the wall time of flows, and of `willmore fair`.",
+            )],
+            options: Some("--shares"),
+        },
+        ResultFolder {
             name: "gpu",
             title: "Performance on a GPU",
             description: "Not in the paper: what a step costs on an NVIDIA H100 in double precision, with 16 cores for the \
@@ -43,7 +54,7 @@ pub const EXPERIMENT: Experiment = Experiment {
             options: None,
         },
     ],
-    metrics: &[&METRICS],
+    metrics: &[&METRICS, &shares::METRICS],
     words: &[],
 };
 
@@ -143,6 +154,10 @@ struct Options {
     #[command(flatten)]
     storage: StorageOptions,
 
+    /// Only measure where the time goes, of steps and of `willmore fair`, in a few minutes; not on a GPU
+    #[arg(long)]
+    shares: bool,
+
     /// Seconds for the comparison of products on each grid
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
     turns: f64,
@@ -205,6 +220,14 @@ fn program(options: &Options) -> Result<()> {
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
     let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
+    let on_cpu = session.device.kind().is_cpu();
+    require(on_cpu || !options.shares, "--shares needs a CPU")?;
+    if on_cpu {
+        shares::measure(&mut session, &options.storage)?;
+    }
+    if options.shares {
+        return session.finish("Where the time goes");
+    }
     let mut all = Vec::new();
     let shape = run.either("disc", "cross");
     for &n in planes {
