@@ -365,7 +365,7 @@ fn figure(flows: &[Spent], fair: &[Spent], device: &ComputeDevice) -> Figure {
         .with_panel(bars("steps", flows, &OF_STEPS))
         .with_panel(bars("the whole of willmore fair", fair, &OF_FAIR))
         .with_note(format!(
-            "Wall time, on {}. From bottom to top as in the legends, column by column.",
+            "Wall time, on {}. From bottom to top in the order of the legends, which goes from left to right, row by row.",
             timing::machine(device)
         ))
 }
