@@ -320,7 +320,7 @@ fn meshes_and_pictures_go_through_pipes() {
             "words.txt",
             "error: standard input cannot be read as a mesh: the file has 0 vertices and no faces",
         ),
-        ("open.off", "error: the surface is open"),
+        ("open.off", "error: all vertices are at the boundary"),
     ] {
         let refused = program(folder.path())
             .args(["fair", "-"])

@@ -9,6 +9,7 @@ use pages::five_digits;
 use crate::faired::MeshReport;
 use crate::parts::{PartFate, PartReport};
 use crate::prelude::*;
+use crate::words::signed;
 
 /// Measures whose change is told.
 pub(crate) const SIZES: [&str; 3] = ["length", "area", "volume"];
@@ -221,7 +222,7 @@ impl Summary {
     fn of_sizes(&self) -> Option<String> {
         let sizes = SIZES.iter().filter_map(|name| {
             let change = match self.measure(&format!("{name}_change_percent")) {
-                Some(percent) if self.mesh.is_none() => format!(" ({percent:+.2} %)"),
+                Some(percent) if self.mesh.is_none() => format!(" ({} %)", signed(percent, 2)),
                 _ => String::new(),
             };
             Some(format!(
@@ -302,7 +303,9 @@ fn of_mesh(mesh: &MeshReport) -> String {
         Some(_) => "vertices",
     };
     let sizes = match (mesh.volume_change_percent, mesh.area_change_percent) {
-        (Some(volume), Some(area)) => format!("volume {volume:+.4} %, area {area:+.3} %"),
+        (Some(volume), Some(area)) => {
+            format!("volume {} %, area {} %", signed(volume, 4), signed(area, 3))
+        }
         _ if mesh.is_open => "the boundary has not moved".to_owned(),
         _ => "the mesh is no longer closed, or folds over itself".to_owned(),
     };

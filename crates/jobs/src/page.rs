@@ -256,7 +256,7 @@ fn table_of_parts(parts: &[&PartReport]) -> Result<Option<Section>> {
             part.place.map(five_digits).join(", "),
             volume(Some(part.volume_before)),
             volume(part.volume_after),
-            change.map_or(String::new(), |change| format!("{change:+.4}")),
+            change.map_or(String::new(), |change| words::signed(change, 4)),
             part.fate.to_string(),
         ]
     });

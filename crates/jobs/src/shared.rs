@@ -17,6 +17,7 @@ use crate::prelude::*;
 use crate::session::{Flowed, flow_of_voxels};
 use crate::values::{Label, SizeTarget};
 use crate::volume::{self, named};
+use crate::words::signed;
 
 /// Cells of the lattice of the walls around all labels.
 const MARGIN: f64 = 3.0;
@@ -103,10 +104,10 @@ impl SharedReport {
         )];
         text.extend(self.labels.iter().map(|label| {
             format!(
-                "label {}: volume {}, {:+.4} %",
+                "label {}: volume {}, {} %",
                 label.label,
                 five_digits(label.volume_after),
-                label.change_percent()
+                signed(label.change_percent(), 4)
             )
         }));
         let bound = match (self.max_distance, self.vertices_at_max_distance) {

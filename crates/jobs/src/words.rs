@@ -6,6 +6,17 @@ use pages::Facts;
 use crate::options::{FairOptions, FlowOptions, InpaintOptions, McfOptions};
 use crate::prelude::*;
 
+/// A change with its sign, to so many digits behind the point; one that is zero to these digits has the sign +.
+pub fn signed(change: f64, digits: usize) -> String {
+    let text = format!("{change:+.digits$}");
+    let is_zero = !text.contains(|c: char| ('1'..='9').contains(&c));
+    if is_zero {
+        text.replace('-', "+")
+    } else {
+        text
+    }
+}
+
 /// The outcome of a run in `dimension` dimensions, as its summary has it.
 pub fn numbers(outcome: &Value, dimension: usize) -> Facts {
     let own = match dimension {

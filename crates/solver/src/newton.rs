@@ -79,10 +79,10 @@ struct Point<const D: usize> {
 
 /// A Newton step that lowers the energy by a smaller part of its slope gains next to nothing; one to the minimum of the quadratic model gains half.
 const POOR: f64 = 0.01;
-/// Parts of a Newton step that are tried on a straight line,
+/// So many of them in a row end a minimization that holds sizes.
+const MOST_POOR: usize = 2;
+/// Parts of a Newton step that are tried on a straight line.
 const STRAIGHT: RangeInclusive<f64> = 1e-6..=1.0;
-/// and where sizes are held: where longer ones along the profile cannot be brought back to the targets, straight ones cannot, either.
-const STRAIGHT_HELD: RangeInclusive<f64> = POOR..=0.0625;
 
 /// How the Newton steps of a minimization that holds sizes get on.
 #[derive(Default)]
@@ -93,6 +93,8 @@ struct Progress {
     since: usize,
     /// Where the last Newton step began.
     last: Option<Outlook>,
+    /// How many of the last steps were poor.
+    poor: usize,
 }
 
 /// The energy where a Newton step begins, and its slope along the direction there.
@@ -103,8 +105,8 @@ struct Outlook {
 }
 
 impl Progress {
-    /// Whether for a while no estimate has been half of the smallest one, or the last step was [poor](POOR): there the measures bend so
-    /// much that only the shortest steps can be brought back to their targets, and many of them would follow.
+    /// Whether for a while no estimate has been half of the smallest one, or the last steps were [poor](POOR): there the measures bend
+    /// so much that only the shortest steps can be brought back to their targets, and many of them would follow.
     fn has_stalled(&mut self, estimate: f64, now: Outlook) -> bool {
         /// Newton steps; those that converge take fewer for a digit.
         const PATIENCE: usize = 10;
@@ -118,7 +120,8 @@ impl Progress {
         }
         let is_poor = (self.last).is_some_and(|last| last.energy - now.energy < POOR * last.slope);
         self.last = Some(now);
-        is_poor || self.since >= PATIENCE
+        self.poor = if is_poor { self.poor + 1 } else { 0 };
+        self.poor >= MOST_POOR || self.since >= PATIENCE
     }
 }
 
@@ -429,10 +432,6 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
         let mut point = self.better_start(start)?;
         let mut progress = Progress::default();
-        let parts = match self.held {
-            Some(_) => STRAIGHT_HELD,
-            None => STRAIGHT,
-        };
         while self.info.newton < self.params.newton_iterations {
             let motion = self.motion(&point)?;
             let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
@@ -467,7 +466,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             }
             point = match self.along_the_profile(&point, &solution)? {
                 Some(next) => next,
-                None => match self.straight(&point, &solution, parts.clone(), 1e-4)? {
+                None => match self.straight(&point, &solution, STRAIGHT, 1e-4)? {
                     Some((place, _)) => self.point(place)?,
                     None => {
                         let exit = self.stuck(decrease, point.energy);

@@ -55,15 +55,15 @@ pub enum Warning {
     Flat(usize),
     /// So many edges of more than two faces, or of two that do not agree, were cut.
     #[display(
-        "{_0} edges of more than two faces, or of two that do not agree, were cut: their vertices stay"
+        "{_0} edges of more than two faces, or of two that do not agree, were cut, and their vertices fixed,"
     )]
     Cut(usize),
     /// So many parts became plates.
-    #[display("{_0} open parts were made plates for the flow, as no lids close them")]
+    #[display("{_0} open parts, which no lids close, were made plates")]
     Plates(usize),
     /// So many parts of how many have no part in the flow.
     #[display(
-        "{parts} of {all} open parts stay as they are, as what would close them crosses the surface"
+        "{parts} of {all} open parts, which nothing closes without crossing the surface, were left out"
     )]
     Left {
         /// Parts that stay.
