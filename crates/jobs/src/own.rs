@@ -118,9 +118,9 @@ impl OpenSurface {
     }
 
     /// As [`TriangleMesh::untangled`], together with the parts that stay.
-    fn untangled(&self, moved: TriangleMesh, before: &TriangleMesh) -> TriangleMesh {
+    fn untangled(&self, moved: &TriangleMesh, before: &TriangleMesh) -> TriangleMesh {
         let [vertices, faces] = [moved.vertices.len(), moved.faces.len()];
-        let [moved, before] = [&moved, before].map(|mesh| mesh.beside(&self.left));
+        let [moved, before] = [moved, before].map(|mesh| mesh.beside(&self.left));
         let mut all = moved.untangled(&before);
         all.vertices.truncate(vertices);
         all.faces.truncate(faces);
@@ -443,7 +443,7 @@ impl OwnMesh {
         let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
         moved = self.bounded(moved, volume, &free);
         moved = match open {
-            Some(open) => open.untangled(moved, rough.mesh()),
+            Some(open) => open.untangled(&moved, rough.mesh()),
             None => moved.untangled(rough.mesh()),
         };
         if moved.vertices == rough.mesh().vertices {

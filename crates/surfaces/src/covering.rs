@@ -173,7 +173,7 @@ impl<'a> Apart<'a> {
         let seams = Seams::find(&lids.mesh)?;
         let mut apart = Self {
             surface,
-            is_dome: vec![false; lids.lids.len()],
+            is_dome: vec![false; lids.each.len()],
             closings: vec![Closing::Lids; seams.components],
             lids,
             seams,
@@ -209,7 +209,7 @@ impl<'a> Apart<'a> {
     }
 
     fn part_of(&self, lid: usize) -> usize {
-        self.seams.component[self.lids.lids[lid].faces.start] as usize
+        self.seams.component[self.lids.each[lid].faces.start] as usize
     }
 
     fn has_lids(&self, part: usize) -> bool {
@@ -218,14 +218,14 @@ impl<'a> Apart<'a> {
 
     /// The lids of parts that have some.
     fn chosen_lids(&self) -> impl Iterator<Item = usize> {
-        (0..self.lids.lids.len()).filter(|lid| self.has_lids(self.part_of(*lid)))
+        (0..self.lids.each.len()).filter(|lid| self.has_lids(self.part_of(*lid)))
     }
 
     /// Makes the lids smooth.
     fn bend(&mut self) {
         let mut free = vec![false; self.lids.mesh.vertices.len()];
         for lid in self.chosen_lids() {
-            free[self.lids.lids[lid].vertices.clone()].fill(true);
+            free[self.lids.each[lid].vertices.clone()].fill(true);
         }
         self.lids.mesh.bend_least(&free);
         // Faces on straight rims, which stay if that does not help.
@@ -236,7 +236,7 @@ impl<'a> Apart<'a> {
     fn raise_domes(&mut self) {
         for height in DOMES {
             let crosses = self.lids.mesh.crossing_faces();
-            let lids = &self.lids.lids;
+            let lids = &self.lids.each;
             let crosses = |lid: &usize| crosses[lids[*lid].faces.clone()].contains(&true);
             let crossing: Vec<usize> = self.chosen_lids().filter(crosses).collect();
             if crossing.is_empty() {
@@ -244,7 +244,7 @@ impl<'a> Apart<'a> {
             }
             for lid in crossing {
                 self.is_dome[lid] = true;
-                self.lids.lids[lid].make_dome(&mut self.lids.mesh, height);
+                self.lids.each[lid].make_dome(&mut self.lids.mesh, height);
             }
         }
     }
@@ -326,8 +326,8 @@ impl<'a> Apart<'a> {
 
     /// The places of the vertices of the surface at lids of these parts.
     fn rims(&self, of: impl Fn(usize) -> bool) -> Vec<[f64; 3]> {
-        let lids = (0..self.lids.lids.len()).filter(|lid| of(*lid));
-        let faces = lids.flat_map(|lid| self.lids.lids[lid].faces.clone());
+        let lids = (0..self.lids.each.len()).filter(|lid| of(*lid));
+        let faces = lids.flat_map(|lid| self.lids.each[lid].faces.clone());
         let corners = faces.flat_map(|face| self.lids.mesh.faces[face]);
         let at: BTreeSet<u32> = corners
             .filter(|v| (*v as usize) < self.surface.vertices.len())
@@ -439,7 +439,9 @@ impl Cuts {
                 singular.extend(*ends);
                 set_angles(mesh, *ends, edge);
                 if is_inside_out {
-                    edge.iter_mut().for_each(|side| side.upwards ^= true);
+                    for side in edge.iter_mut() {
+                        side.upwards ^= true;
+                    }
                 }
                 for [up, down] in pairs(edge) {
                     fans.join_across(up, down);

@@ -25,7 +25,7 @@ pub struct Lids {
     /// For each vertex that was given, whether it is at a hole.
     pub rim: Vec<bool>,
     /// The lids, one for each hole.
-    pub(crate) lids: Vec<Lid>,
+    pub(crate) each: Vec<Lid>,
 }
 
 /// A lid on a hole.
@@ -85,7 +85,7 @@ impl TriangleMesh {
         }
         let lids = loops.iter().map(|around| add_lid(&mut mesh, around));
         Ok(Lids {
-            lids: lids.collect(),
+            each: lids.collect(),
             mesh,
             holes: loops.len(),
             rim,

@@ -176,7 +176,6 @@ impl TriangleMesh {
     }
 
     /// Both meshes as one, the vertices and the faces of the other one behind those of this one. Normals are left out.
-    #[must_use]
     pub fn beside(&self, other: &Self) -> Self {
         let first = self.vertices.len() as u32;
         let others = other.faces.iter().map(|face| face.map(|v| v + first));
