@@ -114,18 +114,22 @@ const USUAL: RangeInclusive<usize> = 3..=30;
 const CHOSEN_ON: [&str; 2] = ["rocker-arm.obj", "armadillo.obj"];
 /// and others, as they are,
 const OTHERS: [&str; 9] = [
-    "cow.obj",
-    "spot.obj",
-    "bunny.off",
-    "fertility.off",
-    "homer.obj",
-    "cheburashka.obj",
-    "bumpy-cube.obj",
-    "ballA.off",
-    "fandisk.obj",
+    "public/common-3d-test-models/cow.obj",
+    "public/common-3d-test-models/spot.obj",
+    "public/libigl-tutorial-data/bunny.off",
+    "public/libigl-tutorial-data/fertility.off",
+    "public/common-3d-test-models/homer.obj",
+    "public/common-3d-test-models/cheburashka.obj",
+    "public/libigl-tutorial-data/bumpy-cube.obj",
+    "public/trimesh/ballA.off",
+    "public/common-3d-test-models/fandisk.obj",
 ];
 /// and machine parts that have few triangles.
-const PARTS: [&str; 3] = ["fixed_top.ply", "plate_holes.STL", "round.stl"];
+const PARTS: [&str; 3] = [
+    "public/trimesh/fixed_top.ply",
+    "public/trimesh/plate_holes.STL",
+    "public/trimesh/round.stl",
+];
 /// Other meshes with sharp edges.
 const SHARP: [&str; 1] = ["fandisk"];
 /// The meshes in the figures.
@@ -150,7 +154,7 @@ struct Options {
     #[command(flatten)]
     run: RunOptions,
 
-    /// Denoise this clean mesh too (OBJ, OFF, PLY or STL); can be repeated [default: the meshes of scripts/fetch_meshes, where they are here]
+    /// Denoise this clean mesh too (OBJ, OFF, PLY or STL); can be repeated [default: those of scripts/fetch_meshes and of its option --public, as far as they are here]
     #[arg(long, value_name = "FILE")]
     mesh: Vec<PathBuf>,
 
