@@ -87,9 +87,9 @@ const STRAIGHT: RangeInclusive<f64> = 1e-6..=1.0;
 /// How the Newton steps of a minimization that holds sizes get on.
 #[derive(Default)]
 struct Progress {
-    /// The smallest estimate so far,
+    /// The smallest estimate so far.
     smallest: Option<f64>,
-    /// and how many Newton steps ago it was half as small as before.
+    /// How many Newton steps ago it was half as small as before.
     since: usize,
     /// Where the last Newton step began.
     last: Option<Outlook>,

@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 pub struct PhaseTimes {
     /// Hessian-vector products.
     pub products: f64,
-    /// Applications of the preconditioner,
+    /// Applications of the preconditioner.
     pub preconditioner: f64,
-    /// and of these what its coarse correction takes.
+    /// The coarse correction in these applications.
     pub coarse: f64,
-    /// Assembly of the coarse correction,
+    /// Assembly of the coarse correction.
     pub assembly: f64,
-    /// and of this the search for the nodes of the interface with their normals and curvatures.
+    /// The search for the nodes of the interface with their normals and curvatures, in this assembly.
     pub samples: f64,
     /// Energies and gradients.
     pub energies: f64,

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use geometry::measure::BoundingBox;
 
 use crate::closed::{Seams, drop_unreferenced, has_no_area};
+use crate::joined::Joined;
 use crate::lids::Lids;
 use crate::mending::{Backs, Mending, flipped, without_doubles};
 use crate::repair::orient;
@@ -14,7 +15,7 @@ use crate::{ClosedMesh, Error, Mended, TriangleMesh, Warning};
 /// How high domes are over holes on which smooth lids would cross the surface or lie on it, as parts of the radius of the hole: the first of these that
 /// is free.
 const DOMES: [f64; 6] = [0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
-/// How far the copies of parts are that become plates, as parts of their longest sides: the first of these that is free.
+/// How far away the copy of a part is that becomes a plate, over its longest side: the first of these that is free.
 const PLATES: [f64; 6] = [-0.1, 0.1, -0.05, 0.05, -0.025, 0.025];
 /// If more than this part of the area can only be left out, the surface is refused.
 const MOST_LEFT: f64 = 0.5;
@@ -28,13 +29,13 @@ const IN_A_PLANE: f64 = 1e-6;
 pub struct Covered {
     /// The closed mesh: the surface comes first, and then its lids.
     pub mended: Mended,
-    /// How many vertices are those of the surface,
+    /// How many vertices are those of the surface.
     pub vertices: usize,
-    /// and how many faces.
+    /// How many faces are those of the surface.
     pub faces: usize,
     /// The places of the vertices at its holes, and at edges that were cut.
     pub rim: Vec<[f64; 3]>,
-    /// Those of them from where the surface does not go on smoothly.
+    /// The places of the rim from where the surface does not go on smoothly.
     pub creases: Vec<[f64; 3]>,
     /// The parts that have no lids without crossings, and are not in the mesh.
     pub left: TriangleMesh,
@@ -429,7 +430,7 @@ impl Cuts {
             edge.len() > 2 || (edge.len() == 2 && edge[0].upwards == edge[1].upwards)
         };
         let mut singular = BTreeSet::new();
-        let mut fans = Fans((0..3 * mesh.faces.len()).collect());
+        let mut fans = Fans(Joined::new(3 * mesh.faces.len()));
         let mut edges = 0;
         // Of what is inside out, the other side is inside.
         let is_inside_out = mesh.volume() < 0.0;
@@ -556,27 +557,14 @@ fn straightest(sorted: &[Side]) -> Vec<[usize; 2]> {
 }
 
 /// Corners that are joined to those of neighbours.
-struct Fans(Vec<usize>);
+struct Fans(Joined);
 
 impl Fans {
-    fn root(&mut self, mut corner: usize) -> usize {
-        while self.0[corner] != corner {
-            self.0[corner] = self.0[self.0[corner]];
-            corner = self.0[corner];
-        }
-        corner
-    }
-
-    fn join(&mut self, one: usize, other: usize) {
-        let [one, other] = [one, other].map(|corner| self.root(corner));
-        self.0[one.max(other)] = one.min(other);
-    }
-
     /// Joins the corners at both ends of two sides that start from these corners in opposite directions.
     fn join_across(&mut self, one: usize, other: usize) {
         let next = |corner: usize| corner - corner % 3 + (corner + 1) % 3;
-        self.join(one, next(other));
-        self.join(next(one), other);
+        self.0.join(one, next(other));
+        self.0.join(next(one), other);
     }
 
     /// Gives every fan of faces at these vertices one of its own.
@@ -588,7 +576,7 @@ impl Fans {
             if !at.contains(&vertex) {
                 continue;
             }
-            let root = self.root(corner);
+            let root = self.0.root(corner);
             let new = *own.entry(root).or_insert_with(|| {
                 if taken.insert(vertex) {
                     return vertex;

@@ -5,6 +5,7 @@ use geometry::parallel;
 use serde::{Deserialize, Serialize};
 
 use crate::half_edges::HalfEdges;
+use crate::joined::Joined;
 use crate::smoothing::{CHUNK, TAUBIN, Umbrellas};
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, TriangleMesh};
@@ -223,15 +224,15 @@ impl<'a> Sides<'a> {
             .edges()
             .filter(|(_, [a, b])| normals[*a].dot(normals[*b]) < least);
         let sharp: Vec<[u32; 2]> = sharp.map(|(ends, _)| ends).collect();
-        let mut chains = Chains((0..self.starts.len() as u32).collect());
+        let mut chains = Joined::new(self.starts.len());
         for [a, b] in &sharp {
-            chains.join(*a, *b);
+            chains.join(*a as usize, *b as usize);
         }
         let mut lengths = vec![0; self.starts.len()];
         for [a, _] in &sharp {
-            lengths[chains.find(*a) as usize] += 1;
+            lengths[chains.root(*a as usize)] += 1;
         }
-        let is_long = |[a, _]: &[u32; 2]| lengths[chains.find(*a) as usize] >= CHAIN;
+        let is_long = |[a, _]: &[u32; 2]| lengths[chains.root(*a as usize)] >= CHAIN;
         sharp.into_iter().filter(is_long).collect()
     }
 }
@@ -251,26 +252,5 @@ impl Sharpened {
             count: sum.count + 1,
             length: sum.length + length,
         })
-    }
-}
-
-/// Vertices that hang together: each points to another one of its chain, and one of these to itself.
-struct Chains(Vec<u32>);
-
-impl Chains {
-    fn find(&mut self, mut vertex: u32) -> u32 {
-        while self.0[vertex as usize] != vertex {
-            let next = self.0[vertex as usize];
-            // The next search takes half as many steps.
-            self.0[vertex as usize] = self.0[next as usize];
-            vertex = self.0[vertex as usize];
-        }
-        vertex
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        // Later lookups go to the smaller one.
-        self.0[a.max(b) as usize] = a.min(b);
     }
 }

@@ -69,6 +69,7 @@ mod format;
 mod half_edges;
 mod hierarchy;
 mod isosurface;
+mod joined;
 mod label_mesh;
 mod level_set;
 mod lids;

@@ -5,6 +5,7 @@ use std::ops::RangeBounds;
 
 use crate::closed::{Depths, Seams, is_flat};
 use crate::half_edges::HalfEdges;
+use crate::joined::Joined;
 use crate::mesh::{has_three_corners, key};
 use crate::repair::orient;
 use crate::vector::{Vector, scaled_normal};
@@ -218,36 +219,22 @@ impl Mending {
 fn first_near(vertices: &[[f64; 3]], near: f64) -> Vec<usize> {
     let cell = |x: &[f64; 3]| x.map(|v| (v / near).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::with_capacity(vertices.len());
-    let mut first: Vec<usize> = (0..vertices.len()).collect();
+    let mut joined = Joined::new(vertices.len());
     for (vertex, x) in vertices.iter().enumerate() {
         let here = cell(x);
-        let mut roots = Vec::new();
         for neighbour in 0..27_i64 {
             let step = [neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1];
             let there = [0, 1, 2].map(|axis| here[axis].saturating_add(step[axis]));
             for &other in cells.get(&there).into_iter().flatten() {
                 let way = Vector::from_array(*x) - Vector::from_array(vertices[other]);
                 if way.length() <= near {
-                    roots.push(root(&mut first, other));
+                    joined.join(vertex, other);
                 }
-            }
-        }
-        if let Some(least) = roots.iter().copied().min() {
-            for joined in roots.into_iter().chain([vertex]) {
-                first[joined] = least;
             }
         }
         cells.entry(here).or_default().push(vertex);
     }
-    (0..vertices.len()).map(|v| root(&mut first, v)).collect()
-}
-
-fn root(first: &mut [usize], mut vertex: usize) -> usize {
-    while first[vertex] != vertex {
-        first[vertex] = first[first[vertex]];
-        vertex = first[vertex];
-    }
-    vertex
+    (0..vertices.len()).map(|v| joined.root(v)).collect()
 }
 
 /// What becomes of two faces that are each other's back.

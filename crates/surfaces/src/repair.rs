@@ -11,6 +11,7 @@ use crate::closed::{Depths, Seams, drop_unreferenced};
 use crate::crossings::touching;
 use crate::half_edges::HalfEdges;
 use crate::hierarchy::{Hierarchy, bounds};
+use crate::joined::Joined;
 use crate::mending::{Backs, flipped, without_doubles};
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh, remeshed_surface};
@@ -349,28 +350,6 @@ fn patches(mesh: &TriangleMesh) -> Vec<usize> {
         *numbers.entry(joined.root(face)).or_insert(next)
     };
     (0..mesh.faces.len()).map(number).collect()
-}
-
-/// Sets that are joined.
-struct Joined(Vec<usize>);
-
-impl Joined {
-    fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    fn root(&mut self, mut one: usize) -> usize {
-        while self.0[one] != one {
-            self.0[one] = self.0[self.0[one]];
-            one = self.0[one];
-        }
-        one
-    }
-
-    fn join(&mut self, one: usize, other: usize) {
-        let (one, other) = (self.root(one), self.root(other));
-        self.0[one.max(other)] = one.min(other);
-    }
 }
 
 fn sampled(grid: Grid<3>, value: impl Fn(Vector) -> f64 + Sync) -> Result<Field<3>, Error> {

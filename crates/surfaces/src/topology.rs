@@ -3,6 +3,7 @@
 use geometry::PhaseField;
 
 use crate::Error;
+use crate::joined::Joined;
 use crate::tetrahedra::{Lattice, LevelSet, Node, Scaled, march};
 
 /// The parts and holes of a closed surface.
@@ -32,44 +33,27 @@ pub fn phase_field_topology(u: &impl PhaseField<3>) -> Result<Topology, Error> {
     Ok(Topology {
         components: count.components,
         // V - E + F with E = 3/2 F.
-        euler_characteristic: count.parents.len() as i64 - count.faces as i64 / 2,
+        euler_characteristic: count.vertices.len() as i64 - count.faces as i64 / 2,
     })
 }
 
-/// Numbers of vertices, faces and components; components are sets of vertices, each with a tree.
+/// Numbers of faces and components, and the components as sets of vertices.
 #[derive(Default)]
 struct Count {
-    parents: Vec<u32>,
+    vertices: Joined,
     faces: usize,
     components: usize,
 }
 
 impl Count {
-    fn root(&mut self, mut vertex: u32) -> u32 {
-        loop {
-            let parent = self.parents[vertex as usize];
-            if parent == vertex {
-                return vertex;
-            }
-            let next = self.parents[parent as usize];
-            self.parents[vertex as usize] = next;
-            vertex = next;
-        }
-    }
-
     fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        if a != b {
-            // Numbers grow away from the root.
-            self.parents[a.max(b) as usize] = a.min(b);
-            self.components -= 1;
-        }
+        self.components -= usize::from(self.vertices.join(a as usize, b as usize));
     }
 }
 
 impl LevelSet for Count {
     fn add_vertex(&mut self, _: [Node; 2]) {
-        self.parents.push(self.parents.len() as u32);
+        self.vertices.push();
         self.components += 1;
     }
 

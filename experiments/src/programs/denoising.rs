@@ -107,9 +107,9 @@ const ITERATIONS: usize = 100;
 /// and the usual ones of Taubin's.
 const USUAL: RangeInclusive<usize> = 3..=30;
 
-/// Meshes on which constants of `willmore fair` were chosen,
+/// Meshes on which constants of `willmore fair` were chosen.
 const CHOSEN_ON: [&str; 2] = ["rocker-arm.obj", "armadillo.obj"];
-/// and others, as they are,
+/// Meshes on which nothing was chosen, as they are.
 const OTHERS: [&str; 9] = [
     "public/common-3d-test-models/cow.obj",
     "public/common-3d-test-models/spot.obj",
@@ -121,7 +121,7 @@ const OTHERS: [&str; 9] = [
     "public/trimesh/ballA.off",
     "public/common-3d-test-models/fandisk.obj",
 ];
-/// and machine parts that have few triangles.
+/// Machine parts of few triangles, on which nothing was chosen.
 const PARTS: [&str; 3] = [
     "public/trimesh/fixed_top.ply",
     "public/trimesh/plate_holes.STL",
@@ -160,7 +160,7 @@ struct Options {
     python: Option<PathBuf>,
 }
 
-/// What a mesh says of a method.
+/// What kind of mesh it is.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Constants of `fair` were chosen on it.
