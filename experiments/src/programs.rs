@@ -2,6 +2,7 @@
 
 use crate::experiment::Experiment;
 
+pub mod paper_numbers;
 pub mod learned_networks;
 pub mod circle_convergence;
 pub mod mcf_cross;

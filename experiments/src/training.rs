@@ -12,7 +12,7 @@ pub const METRICS: MetricTable = MetricTable {
          the paper's Adam instead of Levenberg-Marquardt.",
     words: &[(
         "NETWORK",
-        "`n128`, `n256`, `n512`, for the plane; `surfaces`; `inpainting`",
+        "`n128`, `n256`, `n512`, `n1024`, for the plane; `surfaces`; `inpainting`",
     )],
     rows: &[
         (
@@ -68,7 +68,7 @@ impl NetworkSpec {
         }
     }
 
-    /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`. `n64` to `n512` have the scales of the
+    /// The networks of the accurate recipe: those of the paper's, and one for `eps = h`. `n64` to `n1024` have the scales of the
     /// convergence tests, `eps = 2^-6` and `tautilde = 2^-14`. Inpainting at `n = 1024` has `eps = 2^-8` and `tautilde = 2^-18`,
     /// which are the same ratios as those of the training at `n = 256`. The network of the surfaces serves `n = 64` with `eps = 2^-5` and
     /// `tautilde = 2^-12`; it is trained at `n = 128`, where the smallest sphere measures six cells.
@@ -77,13 +77,14 @@ impl NetworkSpec {
         Self::new("n128", Ratios::of_run(2, 17, 1.0, 2.0, 1.0), 128),
         Self::new("n256", Ratios::of_run(2, 33, 1.0, 4.0, 4.0), 256),
         Self::new("n512", Ratios::of_run(2, 65, 1.0, 8.0, 16.0), 512),
+        Self::new("n1024", Ratios::of_run(2, 129, 1.0, 16.0, 64.0), 1024),
         Self::new("inpainting", Ratios::of_run(2, 17, 1.0, 4.0, 4.0), 256),
         Self::new("surfaces", Ratios::of_run(3, 17, 1.0, 2.0, 1.0), 128),
     ];
     pub const PAPER: &'static [Self] = Self::ACCURATE.split_at(1).1;
-    /// The networks of the paper's convergence tests, each with twice the resolution of the one before.
+    /// The networks that the paper shows, each with twice the resolution of the one before.
     pub const CONVERGENCE: &'static [Self] = Self::PAPER.split_at(3).0;
-    pub const SURFACES: Self = Self::PAPER[4];
+    pub const SURFACES: Self = Self::PAPER[5];
 
     pub fn data(&self, quick: bool) -> Result<SphereData> {
         let data = SphereData::new(self.ratios, self.cells)?;

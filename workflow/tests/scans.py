@@ -1,4 +1,4 @@
-"""Makes a folder of 30 scans, of which one is truncated, one has an edge of three faces and one is empty: python3 scans.py FOLDER"""
+"""Makes a folder of 30 scans: one is truncated, one is empty, and one has three faces at an edge, none of which can move: python3 scans.py FOLDER"""
 
 import subprocess
 import sys
@@ -21,9 +21,9 @@ def make(folder: Path, program: str = "willmore") -> None:
     whole = (folder / "scan 00.ply").read_bytes()
     (folder / "broken.ply").write_bytes(whole[: len(whole) // 2])
     (folder / "empty.stl").touch()
-    text = (folder / "scan 01.obj").read_text(encoding="utf-8")
-    first, second, _ = next(line for line in text.splitlines() if line.startswith("f ")).split()[1:]
-    (folder / "fin.obj").write_text(f"{text}v 1 1 1\nf {first} {second} -1\n", encoding="utf-8")
+    corners = ("0 0 0", "0 0 1", "1 0 0", "-1 1 0", "-1 -1 0")
+    lines = [f"v {corner}" for corner in corners] + [f"f 1 2 {third}" for third in (3, 4, 5)]
+    (folder / "fan.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "notes.txt").write_text("No scan, and so in no table.\n", encoding="utf-8")
 
 

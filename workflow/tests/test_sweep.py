@@ -71,8 +71,8 @@ def test_a_folder_of_thirty_files(finished: Path):
     table = pandas.read_csv(finished / "results/tables/scans.csv")
     assert len(table) == 30 and set(table["run"]) == {run.name for run in tables(finished)["scans"]}
     refused = table[table["status"] == "refused"].set_index("run")["message"]
-    assert set(refused.index) == {"broken.ply", "empty.stl", "fin.obj"}
-    assert "truncated" in refused["broken.ply"] and "is empty" in refused["empty.stl"] and "not a manifold" in refused["fin.obj"]
+    assert set(refused.index) == {"broken.ply", "empty.stl", "fan.obj"}
+    assert "truncated" in refused["broken.ply"] and "is empty" in refused["empty.stl"] and "nothing could move" in refused["fan.obj"]
     good = table[table["status"] == "finished"]
     assert len(good) == scans.GOOD
     for column in ("volume", "mesh.volume_change_percent", "mesh.displacement_rms", "mesh.displacement_largest"):
@@ -134,7 +134,7 @@ def test_refused_runs_are_made_again_on_demand(finished: Path):
     before = outcomes_by_time(finished)
     assert "52 finished, 2 refused" in start(finished, "--retry")
     changed = {path.name for path, moment in outcomes_by_time(finished).items() if before[path] != moment}
-    assert changed == {"broken.ply.json", "empty.stl.json", "fin.obj.json"}
+    assert changed == {"broken.ply.json", "empty.stl.json", "fan.obj.json"}
     assert list(pandas.read_csv(finished / "results/tables/scans.csv")["status"]).count("refused") == 2
 
 

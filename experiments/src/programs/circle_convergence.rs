@@ -31,7 +31,9 @@ pub const EXPERIMENT: Experiment = Experiment {
                     "Error of Willmore flow at the end against the time that a circle takes.",
                 ),
             ],
-            options: Some("--cells 64,128,256 --methods hybrid,fe_implicit,fe_semi"),
+            options: Some(
+                "--cells 64,128,256,512,1024 --methods hybrid,fe_implicit,fe_semi --elements-up-to 512",
+            ),
         },
         ResultFolder {
             name: "circle_cost",

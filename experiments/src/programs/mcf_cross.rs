@@ -13,7 +13,7 @@ pub const EXPERIMENT: Experiment = Experiment {
         description: "A cross that is not convex under mean curvature flow, against finite elements on a finer grid with \
                  smaller steps.",
         figures: comparison::FIGURES,
-        options: Some(""),
+        options: Some("--full --reference-n 2048"),
     }],
     metrics: &[&comparison::METRICS],
     words: &[("SHAPE", "`mcf_cross`")],

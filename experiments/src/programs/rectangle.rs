@@ -13,7 +13,7 @@ pub const EXPERIMENT: Experiment = Experiment {
         title: "Willmore flow of a rectangle",
         description: "All methods against nested implicit finite elements on a finer grid.",
         figures: comparison::FIGURES,
-        options: Some(""),
+        options: Some("--full"),
     }],
     metrics: &[&comparison::METRICS],
     words: &[("SHAPE", "`rectangle`")],

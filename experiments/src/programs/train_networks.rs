@@ -51,11 +51,11 @@ enum Recipe {
     Adam,
     /// The heat kernel and an odd activation by least squares, for the calibrated Willmore scheme
     Accurate,
-    /// Levenberg-Marquardt and Adam, with the learning curves side by side; Adam only for the networks of the convergence tests
+    /// Levenberg-Marquardt and Adam, with the learning curves side by side; Adam for n = 128, 256 and 512 only
     Both,
 }
 
-/// Trains the networks: n = 128, 256, 512 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
+/// Trains the networks: n = 128 to 1024 of the convergence tests, the one for inpainting, and the one for surfaces in 3D.
 #[derive(Parser, Debug)]
 #[command(version)]
 struct Options {
@@ -66,7 +66,7 @@ struct Options {
     #[arg(long, value_enum, default_value_t = Recipe::Lm)]
     recipe: Recipe,
 
-    /// Train this network alone: n128, n256, n512, inpainting or surfaces, with --recipe accurate also n64; can be repeated
+    /// Train this network alone: n128, n256, n512, n1024, inpainting or surfaces, with --recipe accurate also n64; can be repeated
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
 
