@@ -15,6 +15,7 @@ const PAPER: &[(&str, &[u8])] = shipped![
     "d2_k17_eps2_step1.safetensors",
     "d2_k33_eps4_step4.safetensors",
     "d2_k65_eps8_step16.safetensors",
+    "d2_k129_eps16_step64.safetensors",
     "d2_k17_eps4_step4.safetensors",
     "d3_k17_eps2_step1.safetensors",
 ];
@@ -25,6 +26,7 @@ const ACCURATE: &[(&str, &[u8])] = shipped![
     "accurate_d2_k17_eps2_step1.safetensors",
     "accurate_d2_k33_eps4_step4.safetensors",
     "accurate_d2_k65_eps8_step16.safetensors",
+    "accurate_d2_k129_eps16_step64.safetensors",
     "accurate_d2_k17_eps4_step4.safetensors",
     "accurate_d3_k17_eps2_step1.safetensors",
 ];
