@@ -81,6 +81,9 @@ struct Point<const D: usize> {
 const POOR: f64 = 0.01;
 /// So many of them in a row end a minimization that holds sizes.
 const MOST_POOR: usize = 2;
+/// A single one ends it where the estimated distance to the minimum is larger than this part of the motion, and the tolerance is not much smaller:
+/// a shorter step then reaches its minimum in fewer Newton steps than the rest of this one takes.
+const FAR: f64 = 0.1;
 /// Parts of a Newton step that are tried on a straight line.
 const STRAIGHT: RangeInclusive<f64> = 1e-6..=1.0;
 
@@ -107,7 +110,7 @@ struct Outlook {
 impl Progress {
     /// Whether for a while no estimate has been half of the smallest one, or the last steps were [poor](POOR): there the measures bend
     /// so much that only the shortest steps can be brought back to their targets, and many of them would follow.
-    fn has_stalled(&mut self, estimate: f64, now: Outlook) -> bool {
+    fn has_stalled(&mut self, estimate: f64, tolerance: f64, now: Outlook) -> bool {
         /// Newton steps; those that converge take fewer for a digit.
         const PATIENCE: usize = 10;
         if self
@@ -121,7 +124,9 @@ impl Progress {
         let is_poor = (self.last).is_some_and(|last| last.energy - now.energy < POOR * last.slope);
         self.last = Some(now);
         self.poor = if is_poor { self.poor + 1 } else { 0 };
-        self.poor >= MOST_POOR || self.since >= PATIENCE
+        let is_far = estimate > FAR && tolerance > 0.01 * FAR;
+        let most = if is_far { 1 } else { MOST_POOR };
+        self.poor >= most || self.since >= PATIENCE
     }
 }
 
@@ -460,7 +465,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             };
             if self.held.is_some()
                 && !self.is_rounding(decrease, point.energy)
-                && progress.has_stalled(self.info.estimate, outlook)
+                && progress.has_stalled(self.info.estimate, self.params.tolerance, outlook)
             {
                 break;
             }
