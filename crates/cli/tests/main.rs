@@ -5,6 +5,7 @@ mod common;
 #[cfg(target_os = "linux")]
 mod disks;
 mod energies;
+mod exact;
 mod examples;
 #[cfg(unix)]
 mod killed;

@@ -337,7 +337,7 @@ impl Error {
 
     pub(crate) fn repairable(error: surfaces::Error, vertices_follow: bool) -> Self {
         use surfaces::Error::{
-            LidCrosses, MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap,
+            LidCrosses, Loose, MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap,
         };
         match error {
             Open { .. }
@@ -346,6 +346,7 @@ impl Error {
             | Nesting { .. }
             | Overlap(_)
             | LidCrosses { .. }
+            | Loose { .. }
             | NoArea { .. } => Self::Repairable {
                 error,
                 vertices_follow,

@@ -132,6 +132,13 @@ pub enum Warning {
     Overlap(surfaces::Overlap),
     /// A part of the boundary is at parts or gaps that are thin for the interface.
     Thin(ThinParts),
+    /// Much of a mesh is at such parts, where its vertices stay.
+    ThinStays {
+        /// Vertices that stay.
+        vertices: usize,
+        /// All vertices.
+        all: usize,
+    },
     /// Nodes that the faces of a mesh that crosses itself put on the wrong side were put right.
     SignsMended {
         /// How many.
@@ -281,6 +288,10 @@ impl fmt::Display for Warning {
             Self::Overlap(overlap) => overlap.fmt(f),
             Self::Lost(loss) => loss.fmt(f),
             Self::Thin(thin) => thin.fmt(f),
+            Self::ThinStays { vertices, all } => write!(
+                f,
+                "{vertices} of {all} vertices, at such thin parts or gaps, stay where they are; more `cells` hold more of them, and `allow_loss` lets them move"
+            ),
             Self::SignsMended { nodes } => write!(
                 f,
                 "the mesh crosses itself: {nodes} nodes of the grid, which its faces put on the wrong side, were put right"

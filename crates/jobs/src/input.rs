@@ -1,5 +1,7 @@
 //! Inputs as phase fields.
 
+use std::cell::Cell;
+
 use engine::{Flow, Storage};
 use geometry::{PURE_BEYOND, distance_from_phase_field, thin_part};
 use images::{Outline, Side, Tones};
@@ -501,6 +503,12 @@ impl<'a> Reader<'a> {
         vertices_follow: bool,
     ) -> Result<(Stored<3>, Option<ClosedMesh>)> {
         let wanted = Topology::of(mesh);
+        // The topology of a union is that of none of its parts.
+        let grids = if mesh.is_union() {
+            &grids[grids.len() - 1..]
+        } else {
+            grids
+        };
         let (field, found) = self.first_good(grids, |reader| {
             let grid = reader.grid_around(&mesh.bounding_box(), part)?;
             let field = reader.mesh_field(mesh, grid)?;
@@ -508,7 +516,7 @@ impl<'a> Reader<'a> {
             Ok(((field, found), found == wanted))
         })?;
         let surface = self.marched(&field)?;
-        if found != wanted {
+        if found != wanted && !mesh.is_union() {
             let loss = self.loss(mesh, &field, surface.as_ref(), found);
             if refuses(&field)? {
                 return Err(Error::Lost {
@@ -617,22 +625,34 @@ impl<'a> Reader<'a> {
     }
 
     /// A mesh whose vertices follow the flow, on the coarsest grid that holds its parts and holes.
-    pub fn own(&mut self, own: OwnMesh, file: &File) -> Result<Loaded> {
-        let (rough, start) = (own.rough(), &own.fairing().start);
+    pub fn own(&mut self, mut own: OwnMesh, file: &File) -> Result<Loaded> {
         let part = OWN_PART[usize::from(own.fairing().noise == 0.0)];
         let refuses = self.allows_loss != Some(true);
-        self.tell_overlap(start, refuses, true)?;
+        let start = &own.fairing().start;
+        if !start.is_union() {
+            self.tell_overlap(start, refuses, true)?;
+        }
         let eps_over_h = self.eps_over_h;
         // Vertices keep their distance from what the grid does not hold; and lids may touch each other where the surface does not.
-        let loses_much = |field: &Stored<3>| {
+        let loses_much = |field: &Stored<3>| -> Result<bool> {
             let much = || own.unresolved_part(field, eps_over_h * field.grid().spacing());
             Ok(refuses && !own.has_lids() && much()? >= MOST_LOST)
         };
-        let (field, surface) = self.like_mesh(start, part, &OWN_CELLS, &loses_much, true)?;
-        let grid = field.grid();
-        let sides = rough.mesh().sides(MOST_RAYS);
-        let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
-        self.tell_thin(thin, grid, !own.is_new, self.chosen.is_none())?;
+        // Where the vertices are not those of a new mesh, they stay at what is lost, if enough of them are left to move.
+        let stays = !own.is_new;
+        let is_lost = Cell::new(false);
+        let loses = |field: &Stored<3>| {
+            let width = THIN * eps_over_h * field.grid().spacing();
+            is_lost.set(loses_much(field)?);
+            Ok(is_lost.get() && !(stays && own.moves_enough(&own.fairing().thin(width))))
+        };
+        let (mut field, mut surface) = self.like_mesh(start, part, &OWN_CELLS, &loses, true)?;
+        let grid = *field.grid();
+        if self.keep_thin(&mut own, &grid, is_lost.get())? {
+            field = self.mesh_field(&own.fairing().start, grid)?;
+            surface = self.marched(&field)?;
+        }
+        let (rough, start, grid) = (own.rough(), &own.fairing().start, &grid);
         self.watcher.note(&Note::Grid {
             cells: self.cells(),
             spacing: grid.spacing(),
@@ -651,6 +671,25 @@ impl<'a> Reader<'a> {
             presentation,
             region,
         }))
+    }
+
+    /// Says how much of a mesh is thin. If that is too much, or much is lost on the grid, its vertices there stay; returns whether they do.
+    fn keep_thin(&self, own: &mut OwnMesh, grid: &Grid<3>, is_lost: bool) -> Result<bool> {
+        let rough = own.rough();
+        let sides = rough.mesh().sides(MOST_RAYS);
+        let thin = thin_part(&MeshDistance::new(rough), sides, self.thin_below(grid));
+        let refuses = self.allows_loss != Some(true) && self.chosen.is_none();
+        let is_too_much = is_lost || (refuses && thin >= MOST_LOST);
+        if own.is_new || !is_too_much || !own.keep_thin(self.thin_below(grid)) {
+            self.tell_thin(thin, grid, !own.is_new, self.chosen.is_none())?;
+            return Ok(false);
+        }
+        self.tell_thin(thin, grid, true, false)?;
+        self.watcher.warning(&Warning::ThinStays {
+            vertices: own.kept(),
+            all: own.rough().mesh().vertices.len(),
+        });
+        Ok(true)
     }
 
     /// The longest side of what is in the box: at least so many interface widths from its sides, and unless it is chosen a part of the box and
@@ -813,11 +852,12 @@ impl<'a> Reader<'a> {
     }
 
     fn mesh_field(&self, mesh: &ClosedMesh, grid: Grid<3>) -> Result<Stored<3>> {
-        let (distance, eps) = (MeshDistance::new(mesh), self.eps(&grid));
+        let eps = self.eps(&grid);
         let progress = self.watcher.begins("signed distance", grid.cells() as u64);
         let layer_done = || progress.advance();
         let reach = PURE_BEYOND * eps;
-        let distance = timed(self.watcher, DISTANCES, || {
+        let sample = |body: &ClosedMesh| {
+            let distance = MeshDistance::new(body);
             if self.takes_bricks {
                 // Bricks are stored if a cell in them is so near to one beside the surface.
                 let near = solver::BRICK_REACH * eps + 2.0 * grid.spacing();
@@ -825,12 +865,23 @@ impl<'a> Reader<'a> {
             } else {
                 distance.sample_within(reach, grid, &layer_done)
             }
-        })?;
-        drop(progress);
-        let (distance, nodes) = surfaces::mend_signs(distance);
-        if nodes > 0 {
-            self.watcher.warning(&Warning::SignsMended { nodes });
+        };
+        let (mut union, mut mended): (Option<Stored<3>>, usize) = (None, 0);
+        for body in mesh.bodies() {
+            let distance = timed(self.watcher, DISTANCES, || sample(&body))?;
+            let (distance, nodes) = surfaces::mend_signs(distance);
+            mended += nodes;
+            union = Some(match union {
+                Some(union) => surfaces::united(&union, &distance),
+                None => distance,
+            });
         }
+        drop(progress);
+        if mended > 0 {
+            self.watcher
+                .warning(&Warning::SignsMended { nodes: mended });
+        }
+        let distance = union.expect("there is a body");
         Ok(distance.map(|s| optimal_profile(s, eps)))
     }
 

@@ -316,6 +316,12 @@ fn of_mesh(mesh: &MeshReport) -> String {
         ),
         _ => String::new(),
     };
+    let held_back = match mesh.held_back {
+        Some(count) => format!(
+            "; vertices that were held back, since noise does not explain how far they would have gone: {count}"
+        ),
+        None => String::new(),
+    };
     let edges = match (mesh.kept_edges, mesh.kept_edges_length) {
         (Some(count), Some(length)) => format!(
             "; sharp edges that have stayed sharp (`edges`): {count} of the mesh, {} long together",
@@ -324,7 +330,7 @@ fn of_mesh(mesh: &MeshReport) -> String {
         _ => String::new(),
     };
     format!(
-        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}{edges}{bound}",
+        "{moved} moved by {:.3e} (root mean square) and {:.3e} at most, {:.3} % and {:.3} % of the longest side; {sizes}{edges}{bound}{held_back}",
         mesh.displacement_rms,
         mesh.displacement_largest,
         mesh.displacement_rms_percent,

@@ -17,6 +17,8 @@ use crate::presentation::Known;
 pub const INPUT: &str = "input";
 /// Rings of vertices beside a boundary that go on smoothly from it.
 const RINGS: usize = 4;
+/// Of a mesh with thin parts at least this part of the vertices moves.
+const FEWEST_MOVING: f64 = 0.1;
 
 /// A mesh of which everything but the positions of its vertices stays: see [`Fairing`].
 #[derive(Default, Serialize, Deserialize)]
@@ -39,6 +41,9 @@ pub struct OwnMesh {
     /// Whether sharp edges stay.
     #[serde(default)]
     edges: Edges,
+    /// The width of parts and gaps at whose faces vertices stay.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    thin_below: Option<f64>,
     /// Whether the zero level set takes its place in the end.
     #[serde(default)]
     pub is_new: bool,
@@ -72,6 +77,10 @@ struct OpenSurface {
     rim: HashSet<[u64; 3]>,
     /// Those of them from where it does not go on smoothly.
     creases: HashSet<[u64; 3]>,
+    /// The places of those where it is not known what is inside.
+    unsure: HashSet<[u64; 3]>,
+    /// Whether there are such places at all.
+    is_unsure: bool,
     /// Parts that have no lids, and stay as they are.
     left: TriangleMesh,
     noise: f64,
@@ -84,6 +93,8 @@ impl OpenSurface {
             faces: covered.faces,
             rim: covered.rim.iter().map(|x| key(*x)).collect(),
             creases: covered.creases.iter().map(|x| key(*x)).collect(),
+            unsure: covered.unsure.iter().map(|x| key(*x)).collect(),
+            is_unsure: covered.is_unsure,
             left: covered.left.clone(),
             noise: covered.noise(),
         }
@@ -109,6 +120,12 @@ impl OpenSurface {
             .zip(rim)
             .map(|(near, rim)| *near && !rim)
             .collect()
+    }
+
+    /// Whether a vertex stays.
+    fn stays(&self, x: [f64; 3]) -> bool {
+        let place = key(x);
+        self.rim.contains(&place) || self.unsure.contains(&place)
     }
 
     /// Whether each vertex is at a crease.
@@ -198,7 +215,7 @@ impl OwnMesh {
         let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, &bytes, &self.file));
         let keep = keep.transpose()?;
         let chosen = |x| matches!(&keep, Some(keep) if keep.signed_distance(x) <= 0.0);
-        let stays = |x| chosen(x) || open.as_ref().is_some_and(|open| open.rim.contains(&key(x)));
+        let stays = |x| chosen(x) || open.as_ref().is_some_and(|open| open.stays(x));
         let lids = open
             .as_ref()
             .map_or(0, |open| closed.mesh().vertices.len() - open.vertices);
@@ -206,6 +223,13 @@ impl OwnMesh {
             Fairing::with_lids(closed, self.noise, stays, lids).with_edges(self.edges);
         if is_estimated {
             fairing = fairing.with_found_noise(self.noise);
+        }
+        // Where it is not known what the surface bounds, vertices may follow another one than theirs.
+        let is_unsure = open.as_ref().is_some_and(|open| open.is_unsure);
+        fairing.is_cautious = self.noise > 0.0 && (is_unsure || self.thin_below.is_some());
+        if let Some(width) = self.thin_below {
+            let thin = fairing.thin(width);
+            fairing = fairing.keeping(&thin);
         }
         let kept = fairing.kept.iter().filter(|&&kept| kept).count();
         if kept == fairing.kept.len() {
@@ -235,6 +259,64 @@ impl OwnMesh {
         Ok(changes)
     }
 
+    /// Lets the vertices stay at faces where the body or the gap before it is thinner than this width, unless next to none would be left to move;
+    /// returns whether they do.
+    pub fn keep_thin(&mut self, width: f64) -> bool {
+        let fairing = self.fairing();
+        let thin = fairing.thin(width);
+        if !self.moves_enough(&thin) {
+            return false;
+        }
+        let mut kept = fairing.clone().keeping(&thin);
+        kept.is_cautious = self.noise > 0.0;
+        if let Some(loaded) = &mut self.loaded {
+            loaded.fairing = kept;
+            loaded.followed = OnceLock::new();
+        }
+        self.thin_below = Some(width);
+        true
+    }
+
+    /// Gives the rings beside a boundary back what the flow has made of them where bending them takes some of their vertices farther than noise explains.
+    fn unbend_far(&self, moved: &mut TriangleMesh, faired: &[[f64; 3]], rings: &[bool]) {
+        let most = Fairing::EXPLAINED * self.noise;
+        let mut goes_back: Vec<bool> = (0..rings.len())
+            .map(|v| rings[v] && distance(moved.vertices[v], faired[v]) > most)
+            .collect();
+        loop {
+            let before = goes_back.iter().filter(|back| **back).count();
+            for face in &moved.faces {
+                if face.iter().any(|&v| goes_back[v as usize]) {
+                    for &v in face {
+                        goes_back[v as usize] |= rings[v as usize];
+                    }
+                }
+            }
+            if goes_back.iter().filter(|back| **back).count() == before {
+                break;
+            }
+        }
+        for (vertex, _) in goes_back.iter().enumerate().filter(|(_, back)| **back) {
+            moved.vertices[vertex] = faired[vertex];
+        }
+    }
+
+    /// Whether enough vertices of the surface move if these stay, too.
+    pub fn moves_enough(&self, without: &[bool]) -> bool {
+        let fairing = self.fairing();
+        let surface = fairing.kept.len() - fairing.lids;
+        let moves = |v: &usize| !fairing.kept[*v] && !without[*v];
+        let moving = (0..surface).filter(moves).count();
+        moving as f64 >= FEWEST_MOVING * surface as f64
+    }
+
+    /// How many vertices of the surface stay.
+    pub fn kept(&self) -> usize {
+        let fairing = self.fairing();
+        let surface = fairing.kept.len() - fairing.lids;
+        fairing.kept[..surface].iter().filter(|kept| **kept).count()
+    }
+
     /// Says whether sharp edges stay.
     pub fn set_edges(&mut self, edges: Edges) {
         self.edges = edges;
@@ -245,14 +327,22 @@ impl OwnMesh {
 
     /// A closed mesh of one that may be open, if its vertices follow the flow.
     fn closed(&self, mesh: &TriangleMesh) -> Result<(Mended, Option<OpenSurface>)> {
-        use surfaces::Error::{MixedOrientation, NoArea, NonManifold, Open};
+        use surfaces::Error::{MixedOrientation, Nesting, NoArea, NonManifold, Open, Overlap};
         let error = match ClosedMesh::mended(mesh.clone()) {
-            Ok(mended) => return Ok((mended, None)),
+            Ok(mended) => match mended.mesh.overlap().filter(|_| !self.is_new) {
+                None => return Ok((mended, None)),
+                Some(overlap) => Overlap(overlap),
+            },
             Err(error) => error,
         };
         let may_have_lids = matches!(
             error,
-            Open { .. } | NonManifold { .. } | MixedOrientation { .. } | NoArea { .. }
+            Open { .. }
+                | NonManifold { .. }
+                | MixedOrientation { .. }
+                | NoArea { .. }
+                | Nesting { .. }
+                | Overlap(_)
         );
         if self.is_new || !may_have_lids {
             return Err(Error::own_mesh(error));
@@ -397,21 +487,21 @@ impl OwnMesh {
     pub fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64, up: UpAxis) -> Result<Faired> {
         let rough = self.rough();
         if self.is_new {
-            let mut mesh = surface(u, eps)?;
+            let made = surface(u, eps)?;
             // That of the zero level set, but for what noise does not change.
             let volume = (self.noise > 0.0 || self.keeps_volume).then(|| rough.volume());
             let (grid, moving) = (u.grid(), self.nodes(u.grid()));
             let moves = |x: [f64; 3]| {
                 (moving.as_ref()).is_none_or(|moving| moving.contains(grid.nearest(x)))
             };
-            let free: Vec<bool> = mesh.vertices.iter().map(|&x| moves(x)).collect();
-            mesh = self.bounded(mesh, volume, &free);
-            let mut made = Faired::anew(rough, mesh, up);
-            made.report.noise = Some(self.noise);
+            let free: Vec<bool> = made.vertices.iter().map(|&x| moves(x)).collect();
+            let mesh = self.bounded(made.clone(), volume, &free).untangled(&made);
+            let mut faired = Faired::anew(rough, mesh, up);
+            faired.report.noise = Some(self.noise);
             if let Some(length) = self.max_distance {
-                made.report.bound(length, &made.displacement.lengths);
+                faired.report.bound(length, &faired.displacement.lengths);
             }
-            return Ok(made);
+            return Ok(faired);
         }
         let fairing = self.fairing();
         let followed = self.followed(start, eps)?;
@@ -429,12 +519,16 @@ impl OwnMesh {
             let normals = moved.vertex_normals();
             let faired = moved.vertices.clone();
             moved.bend_least_beside(&rings, &open.creases(rough.mesh()));
+            if fairing.is_cautious {
+                self.unbend_far(&mut moved, &faired, &rings);
+            }
             // Along the surface vertices stay where they were.
             for ((x, from), normal) in moved.vertices.iter_mut().zip(&faired).zip(&normals) {
                 let along: f64 = (0..3).map(|i| (x[i] - from[i]) * normal[i]).sum();
                 *x = [0, 1, 2].map(|i| from[i] + along * normal[i]);
             }
         }
+        let held_back = (fairing.is_cautious).then(|| fairing.hold_back(&mut moved));
         let volume = match (self.keeps_volume, self.drives_volume) {
             (true, _) => Some(rough.volume()),
             (_, true) => Some(ZeroSet::of(u, eps)?.volume),
@@ -452,8 +546,7 @@ impl OwnMesh {
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
         let goes: HashMap<_, _, PlaceHasher> =
             (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
-        let squares = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
-        let lengths: Vec<f64> = squares.map(f64::sqrt).collect();
+        let lengths: Vec<f64> = ways.map(|(a, b)| distance(*a, *b)).collect();
         let Loaded {
             bytes,
             mesh,
@@ -484,11 +577,12 @@ impl OwnMesh {
         let mut report = MeshReport {
             noise: Some(self.noise),
             left_behind_percent: Some(100.0 * followed.left_behind(u)?),
+            held_back: held_back.filter(|count| *count > 0),
             kept_edges: (edges.count > 0).then_some(edges.count),
             kept_edges_length: (edges.count > 0).then_some(edges.length),
             ..MeshReport::new(rough, &moved, &lengths)
         };
-        if open.is_some() {
+        if open.is_some_and(|open| !open.rim.is_empty()) {
             // What lids enclose is no size of the surface.
             (report.volume_change_percent, report.area_change_percent) = (None, None);
             report.is_open = true;
@@ -521,6 +615,11 @@ impl OwnMesh {
 /// Parts and gaps that are thinner than two cells come and go with the place of the grid.
 pub fn thinnest(grid: &Grid<3>) -> f64 {
     2.0 * grid.spacing()
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let squares = (0..3).map(|i| (a[i] - b[i]).powi(2));
+    squares.sum::<f64>().sqrt()
 }
 
 /// The coordinates as bits, by which equal positions are found; -0 is 0.

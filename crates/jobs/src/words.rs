@@ -187,7 +187,7 @@ const SPACE: [(&str, &str); 8] = [
     ),
 ];
 
-const NUMBERS: [(&str, &str); 27] = [
+const NUMBERS: [(&str, &str); 28] = [
     (
         "/energy_terms/spontaneous_curvature",
         "Spontaneous curvature in the energy, in one over units of the input",
@@ -275,6 +275,10 @@ const NUMBERS: [(&str, &str); 27] = [
     (
         "/mesh/left_behind_percent",
         "Vertices that could not follow the surface, in percent of all",
+    ),
+    (
+        "/mesh/held_back",
+        "Vertices held back, since noise does not explain how far they would have gone",
     ),
     ("/components", "Closed parts at the end"),
     ("/euler_characteristic", "Euler characteristic at the end"),

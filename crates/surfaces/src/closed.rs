@@ -13,13 +13,15 @@ use crate::{Error, TriangleMesh};
 /// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
 ///
 /// There may be several components. Those that lie inside others and are oriented inwards bound
-/// cavities. Intersections of faces are not looked for: where a surface crosses itself, inside and
+/// cavities. A [union](ClosedMesh::bodies) has several bodies that overlap. Other intersections of faces are not looked for: where a surface crosses itself, inside and
 /// outside are not defined, and no error tells so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosedMesh {
     mesh: TriangleMesh,
     euler_characteristic: i64,
     components: usize,
+    /// The body of each face, where there are several that overlap.
+    bodies: Vec<u32>,
 }
 
 /// The sum of the volumes behind faces is exact to this part of the product of their area and the longest side.
@@ -69,6 +71,22 @@ pub enum Warning {
         /// Parts that stay.
         parts: usize,
         /// All parts.
+        all: usize,
+    },
+    /// So many parts overlap, or cross themselves.
+    #[display("{_0} parts that overlap are seen as one body")]
+    United(usize),
+    /// So many holes have lids that cross the surface.
+    #[display("{_0} of the lids cross the surface")]
+    CrossingLids(usize),
+    /// So many vertices of how many are at places where it is not known what is inside.
+    #[display(
+        "{vertices} of {all} vertices, which are within other parts, near crossings of parts and lids, or on parts left out, stay where they are"
+    )]
+    Stay {
+        /// Vertices that stay.
+        vertices: usize,
+        /// All vertices.
         all: usize,
     },
     /// So many holes have lids.
@@ -144,15 +162,73 @@ impl ClosedMesh {
             euler_characteristic: seams.vertices as i64 - mesh.faces.len() as i64 / 2,
             components: seams.components,
             mesh,
+            bodies: Vec::new(),
         };
         Ok((closed, warnings))
+    }
+
+    /// The union of the bodies that these faces bound, each by itself oriented outwards.
+    ///
+    /// # Errors
+    /// As [`Self::new`], but for parts that lie in others.
+    pub(crate) fn union(mesh: TriangleMesh, bodies: Vec<u32>) -> Result<Self, Error> {
+        let seams = Seams::find(&mesh)?;
+        let union = Self {
+            euler_characteristic: seams.vertices as i64 - mesh.faces.len() as i64 / 2,
+            components: seams.components,
+            mesh: TriangleMesh::default(),
+            bodies,
+        };
+        union.moved(mesh)
+    }
+
+    /// The bodies that overlap, each a closed surface, if the mesh bounds their union; otherwise one, the mesh itself.
+    #[must_use]
+    pub fn bodies(&self) -> Vec<Self> {
+        let count = self.bodies.iter().max().map_or(1, |last| last + 1);
+        if count == 1 {
+            return vec![self.clone()];
+        }
+        let body = |number: u32| {
+            let faces = self.mesh.faces.iter().zip(&self.bodies);
+            let faces = faces.filter(|(_, body)| **body == number);
+            let mut mesh = TriangleMesh {
+                faces: faces.map(|(face, _)| *face).collect(),
+                ..self.mesh.clone()
+            };
+            drop_unreferenced(&mut mesh);
+            let seams = Seams::find(&mesh).expect("all is closed");
+            Self {
+                euler_characteristic: seams.vertices as i64 - mesh.faces.len() as i64 / 2,
+                components: seams.components,
+                mesh,
+                bodies: Vec::new(),
+            }
+        };
+        (0..count).map(body).collect()
+    }
+
+    /// The body of each vertex, of [`Self::bodies`].
+    pub(crate) fn body_of_vertices(&self) -> Vec<u32> {
+        let mut of_vertices = vec![0; self.mesh.vertices.len()];
+        for (face, body) in self.mesh.faces.iter().zip(&self.bodies) {
+            for &vertex in face {
+                of_vertices[vertex as usize] = *body;
+            }
+        }
+        of_vertices
+    }
+
+    /// Whether it bounds the union of bodies that overlap.
+    pub fn is_union(&self) -> bool {
+        !self.bodies.is_empty()
     }
 
     /// The surface with these positions of its vertices in place of its own. What depends on its faces alone is not looked at again.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn moved(&self, mesh: TriangleMesh) -> Result<Self, Error> {
+    pub fn moved(&self, mesh: TriangleMesh) -> Result<Self, Error> {
         // Vertices of seams may come apart, and parts into each other.
         let no_seams = self.euler_characteristic + mesh.faces.len() as i64 / 2;
         let is_one = self.components == 1 && mesh.vertices.len() as i64 == no_seams;
@@ -164,8 +240,18 @@ impl ClosedMesh {
                 && has_no_area(&mesh).is_ok()
                 && mesh.volume() > ROUNDING * area(&mesh) * side
         };
-        if is_one && is_good() {
-            return Ok(Self { mesh, ..*self });
+        if (is_one || self.is_union()) && is_good() {
+            return Ok(Self {
+                mesh,
+                bodies: self.bodies.clone(),
+                ..*self
+            });
+        }
+        if self.is_union() {
+            mesh.check(f64::MAX)?;
+            has_no_area(&mesh)?;
+            let (volume, area) = (mesh.volume(), area(&mesh));
+            return Err(Error::NoVolume { volume, area });
         }
         Self::new(mesh).map(|(moved, _)| moved)
     }

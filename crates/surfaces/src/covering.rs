@@ -5,20 +5,30 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use geometry::measure::BoundingBox;
 
 use crate::closed::{Seams, drop_unreferenced, has_no_area};
+use crate::hierarchy::Hierarchy;
 use crate::joined::Joined;
 use crate::lids::Lids;
 use crate::mending::{Backs, Mending, flipped, without_doubles};
 use crate::repair::orient;
+use crate::triangle::Triangle;
 use crate::vector::{Vector, scaled_normal};
-use crate::{ClosedMesh, Error, Mended, TriangleMesh, Warning};
+use crate::{ClosedMesh, Error, Mended, MeshDistance, TriangleMesh, Warning};
 
 /// How high domes are over holes on which smooth lids would cross the surface or lie on it, as parts of the radius of the hole: the first of these that
 /// is free.
 const DOMES: [f64; 6] = [0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
 /// How far away the copy of a part is that becomes a plate, over its longest side: the first of these that is free.
 const PLATES: [f64; 6] = [-0.1, 0.1, -0.05, 0.05, -0.025, 0.025];
-/// If more than this part of the area can only be left out, the surface is refused.
+/// If more than this part of the area can only be left out, parts are closed that cross others,
 const MOST_LEFT: f64 = 0.5;
+/// and if it is still more than this, the surface is refused.
+const MOST_LEFT_OF_UNION: f64 = 0.9;
+/// Lids may cross the surface of a part where nothing else closes it, if they cross no more than this part of its area.
+const MOST_CROSSED: f64 = 0.2;
+/// A surface of more parts, or with more holes, is one of loose faces, which would take long to be closed one by one.
+const MOST_LOOSE: usize = 2000;
+/// Vertices that are no farther than this part of the longest side from another body, or from a lid that crosses something, stay.
+const BESIDE: f64 = 0.02;
 /// Rounds in which the normals along which that is are averaged over neighbours.
 const AVERAGED: usize = 8;
 /// A part with its lids that encloses less than this part of its area times its longest side lies in a plane.
@@ -37,7 +47,11 @@ pub struct Covered {
     pub rim: Vec<[f64; 3]>,
     /// The places of the rim from where the surface does not go on smoothly.
     pub creases: Vec<[f64; 3]>,
-    /// The parts that have no lids without crossings, and are not in the mesh.
+    /// The places of other vertices that stay, since it is not known there what is inside: those within other bodies, or near where bodies or lids cross.
+    pub unsure: Vec<[f64; 3]>,
+    /// Whether there are such places at all, near vertices or not.
+    pub is_unsure: bool,
+    /// The parts that have no lids, and are not in the mesh.
     pub left: TriangleMesh,
 }
 
@@ -66,8 +80,13 @@ impl ClosedMesh {
     /// Vis. Comput. Graph. 7 (2001)). Where a smooth lid would cross the surface, a dome takes its place. A part in a plane, and one with
     /// lids that still cross, becomes a plate, with a copy of it beside it. Parts for which there is no place are left out.
     ///
+    /// Where that is more than half of the area, each part is closed by itself: its lids or its plate may cross other parts, and if nothing else closes
+    /// it, itself in a few places. Parts that overlap are a [union of bodies](ClosedMesh::bodies). Vertices for which it is not known then what is inside
+    /// are [named](Covered::unsure).
+    ///
     /// # Errors
-    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`] if more than half of the area would be left out.
+    /// As [`ClosedMesh::mended`] for other faults; [`Error::LidCrosses`] if nearly all of the area would be left out;
+    /// [`Error::Loose`] for thousands of parts or holes.
     pub fn covered(mesh: TriangleMesh) -> Result<Covered, Error> {
         let mut mending = Mending::of(mesh);
         mending.merge();
@@ -84,23 +103,31 @@ impl ClosedMesh {
         let (apart, closed) = Apart::of(&mending.mesh)?;
         let count = |closing: Closing| apart.closings.iter().filter(|c| **c == closing).count();
         let stays = |lid: usize| apart.closings[apart.part_of(lid)] != Closing::Left;
+        let crossed = apart.crossing_lids();
         let rim = apart.rims(stays);
         let is_crease = |lid: usize| !apart.has_lids(apart.part_of(lid)) || apart.is_dome[lid];
         let mut creases = apart.rims(|lid| stays(lid) && is_crease(lid));
         let (left, holes) = (apart.left(), apart.chosen_lids().count());
         let [lost, all] = [count(Closing::Left), apart.closings.len()];
-        let plates = all - lost - count(Closing::Lids);
+        let plates = all - lost - count(Closing::Lids) - count(Closing::Crossing);
         let [vertices, faces] = closed.surface;
         if lost > 0 {
             mending.changes.push(Warning::Left { parts: lost, all });
         }
         mending.note(holes, Warning::Lids);
         mending.note(plates, Warning::Plates);
+        mending.note(crossed.lids, Warning::CrossingLids);
         mending.mesh = closed.mesh;
-        mending.orient_parts();
-        let (mesh, more) = Self::new(mending.mesh)?;
-        mending.changes.extend(more);
+        let mesh = mending.bounded()?;
         creases.extend(&cuts.places);
+        let unsure = unsure(&mesh, vertices, &crossed.faces);
+        let is_unsure = mesh.is_union() || crossed.lids > 0;
+        if is_unsure {
+            mending.changes.push(Warning::Stay {
+                vertices: unsure.len() + left.vertices.len(),
+                all: vertices + left.vertices.len(),
+            });
+        }
         Ok(Covered {
             mended: Mended {
                 mesh,
@@ -111,9 +138,39 @@ impl ClosedMesh {
             faces,
             rim: rim.into_iter().chain(cuts.places).collect(),
             creases,
+            unsure,
+            is_unsure,
             left,
         })
     }
+}
+
+/// The places of those of the first vertices that are within other bodies or near them, or near these faces.
+fn unsure(mesh: &ClosedMesh, count: usize, crossed: &[Triangle]) -> Vec<[f64; 3]> {
+    let near = BESIDE * mesh.bounding_box().longest_side();
+    let places = &mesh.mesh().vertices[..count];
+    let mut is_unsure = vec![false; count];
+    if !crossed.is_empty() {
+        let (lids, _) = Hierarchy::new(crossed);
+        for (is_unsure, x) in is_unsure.iter_mut().zip(places) {
+            *is_unsure |= lids.is_within(Vector::from_array(*x), near * near);
+        }
+    }
+    if mesh.is_union() {
+        let of_vertices = mesh.body_of_vertices();
+        for (number, body) in (0..).zip(mesh.bodies()) {
+            let others: Vec<usize> = (0..count).filter(|&v| of_vertices[v] != number).collect();
+            let at: Vec<[f64; 3]> = others.iter().map(|&v| places[v]).collect();
+            let distances = MeshDistance::new(&body).signed_distances(&at);
+            for (vertex, distance) in others.into_iter().zip(distances) {
+                is_unsure[vertex] |= distance < near;
+            }
+        }
+    }
+    let pairs = places.iter().zip(is_unsure);
+    (pairs.filter(|(_, is_unsure)| *is_unsure))
+        .map(|(x, _)| *x)
+        .collect()
 }
 
 /// Flips the longest sides of faces without area; returns how many had none.
@@ -135,27 +192,37 @@ enum Closing {
     Lids,
     /// By its own copy, which is so many longest sides of the part away along the normals, and a band between both rims.
     Plate(usize),
+    /// By lids on its holes that cross it in a few places.
+    Crossing,
     /// Not at all: it is left out.
     Left,
 }
 
-impl Closing {
-    /// What is tried next.
-    fn next(self) -> Self {
-        match self {
-            Self::Lids => Self::Plate(0),
-            Self::Plate(last) if last + 1 < PLATES.len() => Self::Plate(last + 1),
-            _ => Self::Left,
-        }
-    }
+/// Which faces must not cross what closes a part.
+#[derive(Clone, Copy, PartialEq)]
+enum Against {
+    /// All others.
+    All,
+    /// Those of the part.
+    Itself,
+}
+
+/// Lids that cross the surface.
+struct CrossingLids {
+    lids: usize,
+    /// Their faces that do.
+    faces: Vec<Triangle>,
 }
 
 /// A surface, and what closes its parts without crossing them.
 struct Apart<'a> {
     surface: &'a TriangleMesh,
+    against: Against,
     lids: Lids,
     seams: Seams,
     is_dome: Vec<bool>,
+    /// Whether each part lies in a plane, or its straight lids on it.
+    is_flat: Vec<bool>,
     closings: Vec<Closing>,
 }
 
@@ -170,23 +237,41 @@ struct Closed {
 
 impl<'a> Apart<'a> {
     fn of(surface: &'a TriangleMesh) -> Result<(Self, Closed), Error> {
+        match Self::against(Against::All, surface) {
+            Err(Error::LidCrosses { .. }) => Self::against(Against::Itself, surface),
+            found => found,
+        }
+    }
+
+    fn against(against: Against, surface: &'a TriangleMesh) -> Result<(Self, Closed), Error> {
         let lids = surface.with_straight_lids()?;
         let seams = Seams::find(&lids.mesh)?;
+        if lids.holes.max(seams.components) > MOST_LOOSE {
+            return Err(Error::Loose {
+                parts: seams.components,
+                holes: lids.holes,
+                most: MOST_LOOSE,
+            });
+        }
         let mut apart = Self {
             surface,
+            against,
             is_dome: vec![false; lids.each.len()],
+            is_flat: vec![false; seams.components],
             closings: vec![Closing::Lids; seams.components],
             lids,
             seams,
         };
         for part in apart.in_a_plane() {
+            apart.is_flat[part] = true;
             apart.closings[part] = Closing::Plate(0);
         }
         apart.bend();
         apart.raise_domes();
         loop {
             let closed = apart.closed();
-            let mut crossing = closed.that_cross();
+            let mut crossing = closed.that_cross(against);
+            crossing.retain(|part| apart.closings[*part] != Closing::Crossing);
             if crossing.is_empty() {
                 return Ok((apart, closed));
             }
@@ -195,10 +280,25 @@ impl<'a> Apart<'a> {
             if crossing.iter().any(of_plates) {
                 crossing.retain(of_plates);
             }
+            let mut at_end = Vec::new();
             for part in crossing {
-                apart.closings[part] = apart.closings[part].next();
+                apart.closings[part] = match apart.closings[part] {
+                    Closing::Lids => Closing::Plate(0),
+                    Closing::Plate(last) if last + 1 < PLATES.len() => Closing::Plate(last + 1),
+                    _ => {
+                        at_end.push(part);
+                        Closing::Left
+                    }
+                };
             }
-            if apart.part_left() > MOST_LEFT {
+            if against == Against::Itself {
+                apart.let_lids_cross(&at_end);
+            }
+            let most = match against {
+                Against::All => MOST_LEFT,
+                Against::Itself => MOST_LEFT_OF_UNION,
+            };
+            if apart.part_left() > most {
                 return Err(Error::LidCrosses {
                     holes: apart.lids.holes,
                     faces: (apart.lids.mesh.crossing_faces().iter())
@@ -214,7 +314,58 @@ impl<'a> Apart<'a> {
     }
 
     fn has_lids(&self, part: usize) -> bool {
-        self.closings[part] == Closing::Lids
+        matches!(self.closings[part], Closing::Lids | Closing::Crossing)
+    }
+
+    /// Which faces cross others that count.
+    fn crossing_faces(&self) -> Vec<bool> {
+        let part = &self.seams.component;
+        (self.lids.mesh).crossing_among(|one, other| self.against.counts(part[one], part[other]))
+    }
+
+    /// Closes those of these parts by lids that these cross in a few places only.
+    fn let_lids_cross(&mut self, parts: &[usize]) {
+        if parts.is_empty() {
+            return;
+        }
+        let crosses = self.crossing_faces();
+        let [mut crossed, mut all] = [0, 1].map(|_| vec![0.0; self.closings.len()]);
+        let faces = self.surface.faces.iter().zip(&self.seams.component);
+        for ((face, part), crosses) in faces.zip(crosses) {
+            let area = scaled_normal(self.surface.corners(*face)).length();
+            all[*part as usize] += area;
+            if crosses {
+                crossed[*part as usize] += area;
+            }
+        }
+        for &part in parts {
+            if !self.is_flat[part] && crossed[part] <= MOST_CROSSED * all[part] {
+                self.closings[part] = Closing::Crossing;
+            }
+        }
+    }
+
+    /// The lids that cross the surface.
+    fn crossing_lids(&self) -> CrossingLids {
+        let mut found = CrossingLids {
+            lids: 0,
+            faces: Vec::new(),
+        };
+        if !self.closings.contains(&Closing::Crossing) {
+            return found;
+        }
+        let crosses = self.crossing_faces();
+        for lid in self.chosen_lids() {
+            let faces = self.lids.each[lid].faces.clone();
+            let crossing = faces.filter(|face| crosses[*face]);
+            let before = found.faces.len();
+            let mesh = &self.lids.mesh;
+            found
+                .faces
+                .extend(crossing.map(|face| mesh.corners(mesh.faces[face])));
+            found.lids += usize::from(found.faces.len() > before);
+        }
+        found
     }
 
     /// The lids of parts that have some.
@@ -233,19 +384,31 @@ impl<'a> Apart<'a> {
         flipped(&mut self.lids.mesh, self.surface.faces.len()..);
     }
 
-    /// Makes lids that cross something domes.
+    /// Makes lids that cross something domes, in the end those that cross the least where lids may cross their part.
     fn raise_domes(&mut self) {
-        for height in DOMES {
-            let crosses = self.lids.mesh.crossing_faces();
-            let lids = &self.lids.each;
-            let crosses = |lid: &usize| crosses[lids[*lid].faces.clone()].contains(&true);
-            let crossing: Vec<usize> = self.chosen_lids().filter(crosses).collect();
+        let mut least: Vec<Option<(usize, f64)>> = vec![None; self.lids.each.len()];
+        // A smooth lid that crosses something becomes a straight one if that is best.
+        let mut heights = vec![0.0; self.lids.each.len()];
+        let last = (self.against == Against::Itself).then_some(None);
+        for height in DOMES.into_iter().map(Some).chain(last) {
+            let crosses = self.crossing_faces();
+            let count = |lid: usize| {
+                let faces = &crosses[self.lids.each[lid].faces.clone()];
+                faces.iter().filter(|crosses| **crosses).count()
+            };
+            let crossing = self.chosen_lids().map(|lid| (lid, count(lid)));
+            let crossing: Vec<_> = crossing.filter(|(_, count)| *count > 0).collect();
             if crossing.is_empty() {
                 return;
             }
-            for lid in crossing {
+            for (lid, count) in crossing {
+                let found = (count, heights[lid]);
+                let best =
+                    least[lid].map_or(found, |best| if best.0 <= count { best } else { found });
+                least[lid] = Some(best);
+                heights[lid] = height.unwrap_or(best.1);
                 self.is_dome[lid] = true;
-                self.lids.each[lid].make_dome(&mut self.lids.mesh, height);
+                self.lids.each[lid].make_dome(&mut self.lids.mesh, heights[lid]);
             }
         }
     }
@@ -283,10 +446,12 @@ impl<'a> Apart<'a> {
         for &v in mesh.faces[..kept.len()].as_flattened() {
             used[v as usize] = true;
         }
-        for (number, closing) in self.closings.iter().enumerate() {
+        let mut of_parts: Vec<Vec<[u32; 3]>> = vec![Vec::new(); self.closings.len()];
+        for &face in &kept {
+            of_parts[part_of(face)].push(all.faces[face]);
+        }
+        for (number, (closing, own)) in self.closings.iter().zip(of_parts).enumerate() {
             if let Closing::Plate(place) = closing {
-                let own = kept.iter().filter(|&&face| part_of(face) == number);
-                let own: Vec<[u32; 3]> = own.map(|&face| all.faces[face]).collect();
                 add_plate(&mut mesh, &own, PLATES[*place]);
                 part.resize(mesh.faces.len(), number);
             }
@@ -341,11 +506,20 @@ impl<'a> Apart<'a> {
 
 impl Closed {
     /// The parts of which something crosses that is not of the surface.
-    fn that_cross(&self) -> Vec<usize> {
-        let crosses = self.mesh.crossing_faces();
+    fn that_cross(&self, against: Against) -> Vec<usize> {
+        let part = &self.part;
+        let counts = |one: usize, other: usize| against.counts(part[one], part[other]);
+        let crosses = self.mesh.crossing_among(counts);
         let added = (self.surface[1]..crosses.len()).filter(|face| crosses[*face]);
         let parts: BTreeSet<usize> = added.map(|face| self.part[face]).collect();
         parts.into_iter().collect()
+    }
+}
+
+impl Against {
+    /// Whether a crossing of faces of these parts counts.
+    fn counts<T: PartialEq>(self, one: T, other: T) -> bool {
+        self == Self::All || one == other
     }
 }
 

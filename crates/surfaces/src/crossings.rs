@@ -35,12 +35,18 @@ pub struct Overlap {
 impl TriangleMesh {
     /// For each face, whether it crosses others, beyond what neighbours have in common.
     pub fn crossing_faces(&self) -> Vec<bool> {
+        self.crossing_among(|_, _| true)
+    }
+
+    /// The same of those pairs of faces alone that count.
+    pub(crate) fn crossing_among(&self, counts: impl Fn(usize, usize) -> bool + Sync) -> Vec<bool> {
         let near = Faces::of(self);
         let crossed: Vec<_> = self.faces.iter().map(|_| AtomicBool::new(false)).collect();
         // Each pair once, beginning with faces that are near each other.
         near.order.par_iter().for_each(|&face| {
             near.any(face, |other| {
                 if face < other
+                    && counts(face, other)
                     && near.share_less_than_an_edge(face, other)
                     && near.touch(face, other)
                     && near.cross(face, other)

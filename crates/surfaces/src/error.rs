@@ -127,6 +127,15 @@ pub enum Error {
         /// Faces that cross others only with lids.
         faces: usize,
     },
+    #[error(
+        "the surface has {parts} loose parts and {holes} holes, more than {most}, so many as are closed one by one: join its faces"
+    )]
+    Loose {
+        parts: usize,
+        holes: usize,
+        /// Most of either.
+        most: usize,
+    },
     #[error("{0}")]
     Overlap(Overlap),
     #[error(

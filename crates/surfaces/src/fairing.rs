@@ -70,6 +70,8 @@ pub struct Fairing {
     pub lids: usize,
     /// Whether sharp edges stay; see [`Self::with_edges`].
     pub edges: Edges,
+    /// Whether vertices stay, in part or all, that the flow takes farther than noise explains, since they may have followed another surface.
+    pub is_cautious: bool,
     /// Rounds of Taubin's smoothing from the rough mesh to the start.
     rounds: usize,
     /// Those of all meshes with these faces.
@@ -87,6 +89,8 @@ pub struct FairedMesh {
     pub edges: KeptEdges,
 }
 
+/// The way of a vertex that noise does not explain at all, in standard deviations.
+const NEVER: f64 = 6.0;
 /// Faces are close together in a cube of this part of the width below which parts are thin.
 const CLOSE: f64 = 0.25;
 
@@ -101,6 +105,8 @@ pub struct Followed {
 }
 
 impl Fairing {
+    /// The longest way of a vertex that noise explains, in its standard deviations.
+    pub const EXPLAINED: f64 = 3.0;
     /// The time steps after the first: this part of the time reached. Longer ones are cheaper, and leave more of the short waves.
     pub const GROWTH: f64 = 0.5;
 
@@ -136,10 +142,28 @@ impl Fairing {
             rough,
             lids,
             edges: Edges::default(),
+            is_cautious: false,
             rounds,
             umbrellas,
             found: OnceLock::new(),
         }
+    }
+
+    /// The same where these vertices stay, too.
+    #[must_use]
+    pub fn keeping(mut self, also: &[bool]) -> Self {
+        for (kept, also) in self.kept.iter_mut().zip(also) {
+            *kept |= also;
+        }
+        let surface = self.surface();
+        (self.start, self.rounds) = without_short_waves(
+            &self.rough,
+            &self.umbrellas,
+            self.noise,
+            &self.kept,
+            surface,
+        );
+        self
     }
 
     /// The same where it is known which noise [is found](TriangleMesh::noise) in the surface without its lids.
@@ -209,13 +233,21 @@ impl Fairing {
         })
     }
 
-    /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or at a face where the
-    /// start, or the gap before it, is thinner than `width`. Of faces that are close together and look to the same side, one is measured.
+    /// Whether each vertex is at something that the grid does not hold: too far from the zero level set at the beginning, or [thin](Self::thin).
     pub fn unresolved(&self, followed: &Followed, width: f64) -> Vec<bool> {
+        let far = RESOLVED.1 * followed.eps;
+        let levels = followed.levels.iter().zip(self.thin(width));
+        levels
+            .map(|(level, is_thin)| is_thin || level.abs() > far)
+            .collect()
+    }
+
+    /// Whether each vertex is at a face where the start, or the gap before it, is thinner than `width`. Of faces that are close together and look to the
+    /// same side, one is measured.
+    pub fn thin(&self, width: f64) -> Vec<bool> {
         let mesh = self.start.mesh();
         let distance = MeshDistance::new(&self.start);
-        let far = RESOLVED.1 * followed.eps;
-        let mut lost: Vec<bool> = (followed.levels.iter().map(|level| level.abs() > far)).collect();
+        let mut lost = vec![false; mesh.vertices.len()];
         let groups = Groups::in_cubes(mesh, CLOSE * width);
         let thin = groups.first.par_iter().map(|&face| {
             let face = mesh.faces[face];
@@ -282,11 +314,21 @@ impl Fairing {
             faces: self.rough.mesh().faces.clone(),
             normals: None,
         };
+        if self.is_cautious {
+            let start = self.start.mesh();
+            hold_back(&mut mesh, start, &start.vertex_normals(), self.noise);
+        }
         if self.noise > 0.0 {
             let wavelength = LONG * followed.eps / followed.placement.scale();
             mesh = mesh.with_long_waves_by(&self.umbrellas, self.start.mesh(), wavelength);
         }
         Ok(self.held(mesh))
+    }
+
+    /// Holds vertices of a mesh back that are farther along the normals from where they were given than noise explains; returns how many.
+    pub fn hold_back(&self, mesh: &mut TriangleMesh) -> usize {
+        let normals = self.start.mesh().vertex_normals();
+        hold_back(mesh, self.rough.mesh(), &normals, self.noise)
     }
 
     /// With the vertices that stay, and with the volume where noise is taken off.
@@ -390,6 +432,29 @@ fn hold(mesh: &mut TriangleMesh, rough: &TriangleMesh, kept: &[bool]) -> bool {
         *x = *from;
     }
     kept.contains(&true)
+}
+
+/// Makes those ways of vertices shorter that are longer along these normals than noise explains; returns how many are. Those that are far longer become
+/// none: such a vertex has followed another surface.
+fn hold_back(
+    mesh: &mut TriangleMesh,
+    from: &TriangleMesh,
+    normals: &[[f64; 3]],
+    noise: f64,
+) -> usize {
+    let (explained, none) = (Fairing::EXPLAINED * noise, NEVER * noise);
+    let mut count = 0;
+    for ((x, from), normal) in mesh.vertices.iter_mut().zip(&from.vertices).zip(normals) {
+        let start = Vector::from_array(*from);
+        let way = Vector::from_array(*x) - start;
+        let far = way.dot(Vector::from_array(*normal)).abs();
+        if far > explained {
+            let part = ((none - far) / (none - explained)).max(0.0);
+            *x = (start + way * (part * explained / far)).to_array();
+            count += 1;
+        }
+    }
+    count
 }
 
 /// Shortens the ways of the vertices from those of a rough mesh along the surface to a length, and says whether some were longer.

@@ -88,6 +88,7 @@ mod smoothing;
 mod tetrahedra;
 mod topology;
 mod triangle;
+mod union;
 mod vector;
 mod write;
 
@@ -114,4 +115,5 @@ pub use repair::{RepairChanges, Repaired, repair};
 pub use signs::mend_signs;
 pub use smoothing::TAUBIN;
 pub use topology::{Topology, phase_field_topology};
+pub use union::united;
 pub use write::{encode, encode_with_up, write, write_with_up};

@@ -1,9 +1,10 @@
 //! Meshes whose faults are trifles, mended so that they bound a solid.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::RangeBounds;
 
-use crate::closed::{Depths, Seams, is_flat};
+use crate::closed::{Depths, Seams, drop_unreferenced, is_flat};
+use crate::crossings::touching;
 use crate::half_edges::HalfEdges;
 use crate::joined::Joined;
 use crate::mesh::{has_three_corners, key};
@@ -126,6 +127,65 @@ impl Mending {
         })
     }
 
+    /// The solid that the faces bound: of parts that overlap, their union.
+    pub(crate) fn bounded(&mut self) -> Result<ClosedMesh, Error> {
+        let seams = Seams::find(&self.mesh)?;
+        let part: Vec<usize> = seams.component.iter().map(|&part| part as usize).collect();
+        let pairs = touching(&self.mesh, &part);
+        if pairs.is_empty() {
+            let mut oriented = Self::of(self.mesh.clone());
+            oriented.orient_parts();
+            match ClosedMesh::new(oriented.mesh) {
+                Ok((mesh, more)) => {
+                    self.changes.extend(oriented.changes);
+                    self.changes.extend(more);
+                    return Ok(mesh);
+                }
+                // A part that crosses itself is around no other one.
+                Err(Error::Nesting { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let overlapping: HashSet<usize> = pairs.iter().flatten().copied().collect();
+        self.note(overlapping.len(), Warning::United);
+        let bodies = apart(seams.components, &pairs);
+        let bodies: Vec<u32> = part.into_iter().map(|part| bodies[part]).collect();
+        let count = bodies.iter().max().map_or(0, |last| last + 1);
+        let (mut within, mut inside_out) = (0, 0);
+        for body in 0..count {
+            for change in self.orient_body(&bodies, body) {
+                match change {
+                    Warning::Bodies(parts) => within += parts,
+                    Warning::InsideOut(parts) => inside_out += parts,
+                    _ => {}
+                }
+            }
+        }
+        self.note(within, Warning::Bodies);
+        self.note(inside_out, Warning::InsideOut);
+        let unreferenced = drop_unreferenced(&mut self.mesh);
+        self.note(unreferenced, Warning::Unreferenced);
+        ClosedMesh::union(self.mesh.clone(), bodies)
+    }
+
+    /// Orients the parts of one body, all of it outwards, and says what was turned for that.
+    fn orient_body(&mut self, bodies: &[u32], body: u32) -> Vec<Warning> {
+        let faces: Vec<usize> = (0..bodies.len()).filter(|f| bodies[*f] == body).collect();
+        let mut alone = Self::of(TriangleMesh {
+            faces: faces.iter().map(|&face| self.mesh.faces[face]).collect(),
+            ..self.mesh.clone()
+        });
+        alone.orient_parts();
+        let is_inside_out = alone.mesh.volume() < 0.0;
+        for (face, mut turned) in faces.into_iter().zip(alone.mesh.faces) {
+            if is_inside_out {
+                turned.swap(1, 2);
+            }
+            self.mesh.faces[face] = turned;
+        }
+        alone.changes
+    }
+
     pub(crate) fn note(&mut self, count: usize, warning: fn(usize) -> Warning) {
         self.changes.extend((count > 0).then(|| warning(count)));
     }
@@ -213,6 +273,21 @@ impl Mending {
         self.note(bodies, Warning::Bodies);
         self.note(shells, Warning::InsideOut);
     }
+}
+
+/// Numbers for so many parts, so that the two of each pair have different ones.
+fn apart(count: usize, pairs: &[[usize; 2]]) -> Vec<u32> {
+    let mut beside = vec![Vec::new(); count];
+    for &[one, other] in pairs {
+        beside[one].push(other);
+        beside[other].push(one);
+    }
+    let mut numbers: Vec<Option<u32>> = vec![None; count];
+    for part in 0..count {
+        let taken: HashSet<u32> = beside[part].iter().filter_map(|&p| numbers[p]).collect();
+        numbers[part] = (0..).find(|number| !taken.contains(number));
+    }
+    numbers.into_iter().flatten().collect()
 }
 
 /// For every vertex the first one that it is joined to by a chain of vertices near to each other.

@@ -28,6 +28,8 @@ const AGREEING: f64 = 0.5;
 const IN_CREASES: f64 = 0.0;
 /// How far points are projected, in cells,
 const REACH: f64 = 0.5;
+/// Rounds in which faces that cross others are drawn apart.
+const UNTANGLING: usize = 8;
 /// and how close to the level set they are then.
 const ON: f64 = 1e-4;
 
@@ -39,11 +41,12 @@ const ON: f64 = 1e-4;
 /// collapse, diagonals are flipped where that makes the smallest angle larger, and vertices move to the centres of the triangles around
 /// them (M. Botsch, L. Kobbelt: A remeshing approach to multiresolution modeling. SGP 2004). Every new place of a vertex is projected
 /// on the level set of the distances `-(4 eps/3) atanh u`, interpolated by Catmull-Rom splines; the normals are its gradients. In the
-/// end, triangles that are still bad get the best of all flips, collapses and small moves nearby.
+/// end, triangles that are still bad get the best of all flips, collapses and small moves nearby. Faces that cross others, as where a gap is narrower than an
+/// edge, are drawn apart by moves to the middle of the vertices around.
 ///
 /// **Guarantees.** The surface is closed and oriented, and has the components and the Euler characteristic of
 /// [`phase_field_surface`](crate::phase_field_surface): every operation keeps them. If the result is no [`ClosedMesh`] all the same,
-/// because components intersect, as they may in noise, it is the surface by marching tetrahedra. No operation turns
+/// or faces that cross others cannot be drawn apart, it is the surface by marching tetrahedra, of which none do. No operation but that turns
 /// a face against the gradients at its corners, or makes an angle that is bad worse. Same input, same bytes: the operations run one
 /// after the other.
 ///
@@ -67,10 +70,47 @@ pub fn remeshed_surface(u: &impl PhaseField<3>, eps: f64) -> Result<TriangleMesh
     }
     remeshing.mend(GOOD, AGREEING);
     remeshing.mend(FAIR, IN_CREASES);
-    Ok(match ClosedMesh::new(remeshing.finish()) {
-        Ok((closed, warnings)) if warnings.is_empty() => closed.into_mesh(),
+    let remeshed = apart(remeshing.finish()).map(ClosedMesh::new);
+    Ok(match remeshed {
+        Some(Ok((closed, warnings))) if warnings.is_empty() => closed.into_mesh(),
         _ => marched,
     })
+}
+
+/// The mesh without crossings of its faces: the vertices of those that cross others, and more and more of their neighbours, go to the middle of those around
+/// them. None if that does not help.
+fn apart(mut mesh: TriangleMesh) -> Option<TriangleMesh> {
+    for round in 0..=UNTANGLING {
+        let crosses = mesh.crossing_faces();
+        if !crosses.contains(&true) {
+            return Some(mesh);
+        }
+        let mut moves = vec![false; mesh.vertices.len()];
+        let mut near = crosses;
+        for _ in 0..=round / 2 {
+            for (face, _) in mesh.faces.iter().zip(&near).filter(|(_, near)| **near) {
+                for &vertex in face {
+                    moves[vertex as usize] = true;
+                }
+            }
+            let is_near = |face: &[u32; 3]| face.iter().any(|&v| moves[v as usize]);
+            near = mesh.faces.iter().map(is_near).collect();
+        }
+        let mut middles = vec![(Vector::ZERO, 0.0); mesh.vertices.len()];
+        for face in &mesh.faces {
+            for i in 0..3 {
+                let next = mesh.vertices[face[(i + 1) % 3] as usize];
+                let middle = &mut middles[face[i] as usize];
+                *middle = (middle.0 + Vector::from_array(next), middle.1 + 1.0);
+            }
+        }
+        for (vertex, (sum, count)) in middles.into_iter().enumerate() {
+            if moves[vertex] {
+                mesh.vertices[vertex] = (sum / count).to_array();
+            }
+        }
+    }
+    None
 }
 
 /// A vertex.

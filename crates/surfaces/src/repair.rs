@@ -115,7 +115,13 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
     mesh.check(1e70)?;
     let mut old = mesh.merged();
     old.normals = None;
+    let sheets = old.clone();
     without_doubles(&mut old, Backs::Enclose);
+    if old.faces.is_empty() {
+        // Each face has its back: sheets with two sides.
+        old = sheets;
+        without_doubles(&mut old, Backs::Repeat);
+    }
     if old.faces.is_empty() {
         return Err(Error::NoFaces);
     }

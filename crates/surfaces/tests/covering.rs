@@ -120,10 +120,10 @@ fn parts_that_nothing_closes_stay() {
         ..open.clone()
     };
     let sheets = together(open, &turned);
-    assert!(matches!(
-        ClosedMesh::covered(sheets.clone()),
-        Err(Error::LidCrosses { .. })
-    ));
+    // By themselves they become two plates.
+    let alone = ClosedMesh::covered(sheets.clone()).unwrap();
+    assert!(alone.mended.mesh.is_union() && alone.left.faces.is_empty());
+    assert!(alone.mended.changes.contains(&Warning::United(2)));
     // A ball with most of the area is faired without them.
     let ball = sphere([4.0, 0.0, 0.0], 1.0, 3);
     let without = covered(together(sheets.clone(), &ball));
@@ -133,6 +133,87 @@ fn parts_that_nothing_closes_stay() {
     assert_eq!(without.faces, ball.faces.len());
     assert_eq!(without.vertices, ball.vertices.len());
     assert!(without.rim.is_empty());
+}
+
+/// Of bodies that reach into each other it is known what is inside; what is within another one, or near it, stays.
+#[test]
+fn bodies_that_overlap_are_a_union() {
+    let ball = |x: f64| sphere([x, 0.0, 0.0], 1.0, 3);
+    let balls = together(together(ball(0.0), &ball(1.2)), &ball(-1.2));
+    let covered = ClosedMesh::covered(balls.clone()).unwrap();
+    let mesh = &covered.mended.mesh;
+    let crossing = |mesh: &TriangleMesh| mesh.crossing_faces().iter().filter(|c| **c).count();
+    assert_eq!(crossing(mesh.mesh()), crossing(&balls));
+    assert_eq!(covered.mended.changes[0], Warning::United(3));
+    // Those that do not touch each other are one.
+    let bodies = mesh.bodies();
+    assert_eq!(bodies.len(), 2);
+    let components: usize = bodies.iter().map(ClosedMesh::components).sum();
+    assert_eq!((components, mesh.components()), (3, 3));
+    assert!(bodies.iter().all(|body| body.volume() > 0.0));
+    let near = 0.02 * mesh.bounding_box().longest_side();
+    for x in &balls.vertices {
+        let from = |centre: f64| (x[0] - centre).hypot(x[1]).hypot(x[2]) - 1.0;
+        let mut distances = [0.0, 1.2, -1.2].map(from);
+        distances.sort_by(f64::total_cmp);
+        // The nearest is its own, or one that it is within.
+        let [first, second, _] = distances;
+        let is_inside = first < -0.02;
+        let is_unsure = covered.unsure.contains(x);
+        if is_inside || second < 0.8 * near {
+            assert!(is_unsure, "{x:?} {distances:?}");
+        }
+        if first > -0.02 && second > 1.2 * near {
+            assert!(!is_unsure, "{x:?} {distances:?}");
+        }
+    }
+}
+
+/// A bowl with a needle from its bottom through its opening and another one out of its side: lids and domes cross the first, plates one or the other.
+#[test]
+fn lids_may_cross_where_nothing_else_closes_a_part() {
+    let mut bowl = sphere([0.0; 3], 1.0, 4);
+    bowl.faces.retain(|face| {
+        let heights = face.iter().map(|&v| bowl.vertices[v as usize][2]);
+        heights.sum::<f64>() < 2.7
+    });
+    for (from, tip) in [
+        ([0.0, 0.0, -1.0], [0.0, 0.0, 3.0]),
+        ([1.0, 0.0, 0.0], [3.0, 0.0, 0.0]),
+    ] {
+        let away = |x: &[f64; 3]| (0..3).map(|i| (x[i] - from[i]).powi(2)).sum::<f64>();
+        let nearest = bowl.vertices.iter_mut();
+        *nearest.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap() = tip;
+    }
+    let covered = ClosedMesh::covered(bowl.clone()).unwrap();
+    let changes = &covered.mended.changes;
+    assert!(changes.contains(&Warning::CrossingLids(1)), "{changes:?}");
+    assert_eq!(covered.faces, bowl.faces.len());
+    let crosses = covered.mended.mesh.mesh().crossing_faces();
+    assert!(crosses[covered.faces..].contains(&true));
+    // The needle has no vertices near the lid.
+    assert!(covered.is_unsure);
+    assert!(covered.unsure.len() < bowl.vertices.len() / 4);
+}
+
+/// What would take hours is refused before it starts.
+#[test]
+fn thousands_of_loose_faces_are_refused() {
+    let mut loose = TriangleMesh::default();
+    for face in 0..2500 {
+        let x = f64::from(face);
+        let first = loose.vertices.len() as u32;
+        loose
+            .vertices
+            .extend([[x, 0.0, 0.0], [x + 0.9, 0.0, 0.1], [x, 0.9, 0.2]]);
+        loose.faces.push([first, first + 1, first + 2]);
+    }
+    let error = ClosedMesh::covered(loose).unwrap_err();
+    let Error::Loose { parts, holes, most } = error else {
+        panic!("{error}");
+    };
+    assert_eq!((parts, holes), (2500, 2500));
+    assert!(most < parts);
 }
 
 /// Both sides of a sheet are one surface, and a face without area in an open surface gives its longest side away.
