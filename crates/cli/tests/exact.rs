@@ -139,8 +139,6 @@ fn exact_shapes_hardly_move() {
         ("block", block()),
         ("fine_block", times(4, block(), false)),
         ("smooth_block", times(4, block(), true)),
-        ("smooth_washer", times(1, turned(&washer, 24), true)),
-        ("smooth_pulley", times(2, turned(&pulley, 12), true)),
     ];
     for (name, mesh) in shapes {
         let file = format!("{name}.ply");
@@ -165,6 +163,7 @@ fn exact_shapes_hardly_move() {
         let ways = mesh.vertices.iter().zip(&faired.vertices);
         let ways = ways.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>());
         let farthest = ways.fold(0.0, f64::max).sqrt();
+        println!("{name} moved by {:.1e} of its size", farthest / size);
         assert!(farthest <= 5e-4 * size, "{name}: {}", farthest / size);
     }
 }

@@ -89,8 +89,6 @@ pub struct FairedMesh {
     pub edges: KeptEdges,
 }
 
-/// The way of a vertex that noise does not explain at all, in standard deviations.
-const NEVER: f64 = 6.0;
 /// Faces are close together in a cube of this part of the width below which parts are thin.
 const CLOSE: f64 = 0.25;
 
@@ -315,8 +313,8 @@ impl Fairing {
             normals: None,
         };
         if self.is_cautious {
-            let start = self.start.mesh();
-            hold_back(&mut mesh, start, &start.vertex_normals(), self.noise);
+            let most = Self::EXPLAINED * self.noise;
+            hold_back(&mut mesh, self.start.mesh(), most);
         }
         if self.noise > 0.0 {
             let wavelength = LONG * followed.eps / followed.placement.scale();
@@ -325,10 +323,11 @@ impl Fairing {
         Ok(self.held(mesh))
     }
 
-    /// Holds vertices of a mesh back that are farther along the normals from where they were given than noise explains; returns how many.
+    /// Holds vertices of a mesh back that are farther from where they were given than noise explains, along the normals and as much along the surface;
+    /// returns how many.
     pub fn hold_back(&self, mesh: &mut TriangleMesh) -> usize {
-        let normals = self.start.mesh().vertex_normals();
-        hold_back(mesh, self.rough.mesh(), &normals, self.noise)
+        let most = 2.0_f64.sqrt() * Self::EXPLAINED * self.noise;
+        hold_back(mesh, self.rough.mesh(), most)
     }
 
     /// With the vertices that stay, and with the volume where noise is taken off.
@@ -434,23 +433,17 @@ fn hold(mesh: &mut TriangleMesh, rough: &TriangleMesh, kept: &[bool]) -> bool {
     kept.contains(&true)
 }
 
-/// Makes those ways of vertices shorter that are longer along these normals than noise explains; returns how many are. Those that are far longer become
-/// none: such a vertex has followed another surface.
-fn hold_back(
-    mesh: &mut TriangleMesh,
-    from: &TriangleMesh,
-    normals: &[[f64; 3]],
-    noise: f64,
-) -> usize {
-    let (explained, none) = (Fairing::EXPLAINED * noise, NEVER * noise);
+/// Makes those ways of vertices shorter that are longer than most; returns how many are. Those that are twice as long, and more, become none: such a vertex
+/// has followed another surface.
+fn hold_back(mesh: &mut TriangleMesh, from: &TriangleMesh, most: f64) -> usize {
     let mut count = 0;
-    for ((x, from), normal) in mesh.vertices.iter_mut().zip(&from.vertices).zip(normals) {
+    for (x, from) in mesh.vertices.iter_mut().zip(&from.vertices) {
         let start = Vector::from_array(*from);
         let way = Vector::from_array(*x) - start;
-        let far = way.dot(Vector::from_array(*normal)).abs();
-        if far > explained {
-            let part = ((none - far) / (none - explained)).max(0.0);
-            *x = (start + way * (part * explained / far)).to_array();
+        let far = way.length();
+        if far > most {
+            let part = (2.0 - far / most).max(0.0);
+            *x = (start + way * (part * most / far)).to_array();
             count += 1;
         }
     }
