@@ -320,7 +320,7 @@ impl<'a> Apart<'a> {
     /// Which faces cross others that count.
     fn crossing_faces(&self) -> Vec<bool> {
         let part = &self.seams.component;
-        (self.lids.mesh).crossing_among(|one, other| self.against.counts(part[one], part[other]))
+        (self.lids.mesh).crossing_among(|one, other| self.against.counts(&part[one], &part[other]))
     }
 
     /// Closes those of these parts by lids that these cross in a few places only.
@@ -508,7 +508,7 @@ impl Closed {
     /// The parts of which something crosses that is not of the surface.
     fn that_cross(&self, against: Against) -> Vec<usize> {
         let part = &self.part;
-        let counts = |one: usize, other: usize| against.counts(part[one], part[other]);
+        let counts = |one: usize, other: usize| against.counts(&part[one], &part[other]);
         let crosses = self.mesh.crossing_among(counts);
         let added = (self.surface[1]..crosses.len()).filter(|face| crosses[*face]);
         let parts: BTreeSet<usize> = added.map(|face| self.part[face]).collect();
@@ -518,7 +518,7 @@ impl Closed {
 
 impl Against {
     /// Whether a crossing of faces of these parts counts.
-    fn counts<T: PartialEq>(self, one: T, other: T) -> bool {
+    fn counts<T: PartialEq>(self, one: &T, other: &T) -> bool {
         self == Self::All || one == other
     }
 }

@@ -285,7 +285,7 @@ fn apart(count: usize, pairs: &[[usize; 2]]) -> Vec<u32> {
     let mut numbers: Vec<Option<u32>> = vec![None; count];
     for part in 0..count {
         let taken: HashSet<u32> = beside[part].iter().filter_map(|&p| numbers[p]).collect();
-        numbers[part] = (0..).find(|number| !taken.contains(number));
+        numbers[part] = (0..=part as u32).find(|number| !taken.contains(number));
     }
     numbers.into_iter().flatten().collect()
 }
