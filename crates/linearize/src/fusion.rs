@@ -199,29 +199,46 @@ pub(crate) fn fuse(operations: &[OperationIr], needed: &HashSet<TensorId>) -> Ve
     let producer: HashMap<TensorId, usize> = (operations.iter().enumerate())
         .flat_map(|(i, operation)| operation.outputs().map(move |t| (t.id, i)))
         .collect();
+    let joins = |p: usize, i: usize| match (&candidates[p], &candidates[i]) {
+        (Some(a), Some(b)) => a.same_loop(b) && !a.is_terminal(),
+        _ => false,
+    };
+    let producers = |i: usize| {
+        let inputs = operations[i].inputs();
+        inputs.filter_map(|t| producer.get(&t.id).copied())
+    };
     // The number of loops and other operations that have to come before. Operations of one loop have the same, and
     // whatever lies between two loops separates them.
     let mut depth = vec![0_usize; operations.len()];
+    for i in 0..operations.len() {
+        depth[i] = producers(i)
+            .map(|p| depth[p] + usize::from(!joins(p, i)))
+            .max()
+            .unwrap_or(0);
+    }
+    // What only waits for inputs of the program is computed in the first loop that reads it: until then it would lie in memory.
+    for i in (0..operations.len()).rev() {
+        let is_result = |t: &TensorIr| (operations[i].outputs()).any(|result| result.id == t.id);
+        let reads = |r: &usize| operations[*r].inputs().any(is_result);
+        let (joined, others): (Vec<usize>, Vec<usize>) = (i + 1..operations.len())
+            .filter(reads)
+            .partition(|&r| joins(i, r));
+        let first = joined.iter().map(|&r| depth[r]).min();
+        let waits = producers(i).next().is_none()
+            && !operations[i].outputs().any(|t| needed.contains(&t.id));
+        if let Some(first) =
+            first.filter(|&first| waits && others.iter().all(|&r| depth[r] > first))
+        {
+            depth[i] = first;
+        }
+    }
     let mut loops = Classes::new(operations.len());
     let mut reader: HashMap<(TensorId, usize), usize> = HashMap::new();
     for (i, operation) in operations.iter().enumerate() {
-        let joins = |p: usize| match (&candidates[p], &candidates[i]) {
-            (Some(a), Some(b)) => a.same_loop(b) && !a.is_terminal(),
-            _ => false,
-        };
-        let producers = || {
-            operation
-                .inputs()
-                .filter_map(|t| producer.get(&t.id).copied())
-        };
-        depth[i] = producers()
-            .map(|p| depth[p] + usize::from(!joins(p)))
-            .max()
-            .unwrap_or(0);
         let Some(candidate) = &candidates[i] else {
             continue;
         };
-        for p in producers().filter(|&p| joins(p) && depth[p] == depth[i]) {
+        for p in producers(i).filter(|&p| joins(p, i) && depth[p] == depth[i]) {
             loops.join(p, i);
         }
         // Loops that read the same are one: it is read once.
@@ -384,6 +401,25 @@ pub(crate) mod tests {
             ]
         );
         assert_eq!(program.outputs, [Output::Values(2), Output::Sum(3)]);
+    }
+
+    #[test]
+    fn what_waits_for_inputs_alone_is_computed_where_it_is_read() {
+        // 2 = |0|, 3 = 1 1, 4 = 2 3: the square waits for the loop after |0|.
+        let operations = [
+            abs(0, 2),
+            binary(Num::Mul, 1, 1, 3),
+            binary(Num::Mul, 2, 3, 4),
+        ];
+        let fused = fuse(&operations, &HashSet::from([t(4).id]));
+        let names: Vec<String> = fused.iter().map(name).collect();
+        assert_eq!(names, ["Abs", ELEMENTWISE]);
+        let (program, inputs, outputs) = custom(&fused[1]);
+        assert_eq!((inputs, outputs), (vec![1, 2], vec![4]));
+        assert_eq!(program.instructions.len(), 2);
+        // Where it is read before, or after the program, it does not.
+        let fused = fuse(&operations, &HashSet::from([t(3).id, t(4).id]));
+        assert_eq!(fused.len(), 3);
     }
 
     #[test]
