@@ -10,14 +10,13 @@ use rayon::prelude::*;
 
 use crate::fft::{Real, lock};
 use crate::fresh::filled;
+use crate::lanes::{dispatch, has_more_registers};
 use crate::ops::Passes;
 
-/// Bricks per task.
-const GROUP: usize = 8;
+/// Bricks per task: new ones are zeroed before they are computed, and stay in the fastest cache.
+const GROUP: usize = 4;
 /// Cells along the axis of a pass that are computed from the same window of values.
 const ROWS: usize = 4;
-/// Lines of a brick that are computed together along its last axis.
-const LINES: usize = 8;
 /// The side of a brick is a multiple of the numbers in a register.
 const MOST_LANES: usize = 8;
 
@@ -154,11 +153,13 @@ impl<T: Real> Pass<'_, T> {
     }
 
     fn group(&self, arch: Arch, group: usize, result: &mut [T]) {
-        arch.dispatch(Group {
+        let group = Group {
             pass: self,
             first: group * GROUP,
             result,
-        });
+            more_registers: has_more_registers(arch),
+        };
+        dispatch(arch, group);
     }
 
     /// The brick itself, the one before and the one after.
@@ -229,46 +230,61 @@ impl<T: Real> Pass<'_, T> {
         }
     }
 
-    /// Along the last axis: from copies of the lines with what lies before and after them.
+    /// Along the last axis, in `LINES` lines at once: each value by its taps for the cells of a register.
     #[inline(always)]
-    fn along<S: Simd, const SIDE: usize>(
+    fn along<S: Simd, const SIDE: usize, const LINES: usize>(
         &self,
         simd: S,
         bricks: [&[T]; 3],
-        copies: &mut [T],
+        spread: &[T::Register<S>],
         result: &mut [T],
     ) {
         let (side, reach) = (self.side::<SIDE>(), self.reach);
-        let taps = &self.weights[ROWS - 1..][..=2 * reach];
-        let lanes = size_of::<T::Register<S>>() / size_of::<T>();
-        let width = 3 * side;
-        let copies = &mut copies[..LINES * width];
-        for (block, result) in result.chunks_exact_mut(LINES * side).enumerate() {
-            let block = block * LINES * side;
-            for (part, brick) in bricks.into_iter().enumerate() {
-                let brick = &brick[block..][..LINES * side];
-                for line in 0..LINES {
-                    let copy = &mut copies[line * width + part * side..][..side];
-                    copy.copy_from_slice(&brick[line * side..][..side]);
-                }
-            }
-            for first in (0..side).step_by(lanes) {
+        let lanes = Self::lanes::<S>();
+        let result = T::registers_mut::<S>(result);
+        let blocks = result.chunks_exact_mut(LINES * side / lanes).enumerate();
+        for (block, result) in blocks {
+            let lines = bricks.map(|brick| &brick[block * LINES * side..][..LINES * side]);
+            for register in 0..side / lanes {
                 let mut sums = [T::splat(simd, T::zero()); LINES];
-                let windows =
-                    &copies[side - reach + first..][..(LINES - 1) * width + 2 * reach + lanes];
-                for (k, tap) in taps.iter().enumerate() {
-                    let tap = T::splat(simd, *tap);
-                    let windows = &windows[k..][..(LINES - 1) * width + lanes];
-                    for (line, sum) in sums.iter_mut().enumerate() {
-                        let values = T::registers::<S>(&windows[line * width..][..lanes]);
-                        *sum = T::multiply_add(simd, tap, values[0], *sum);
+                let mut taps = spread.iter();
+                let first = side + register * lanes - reach;
+                for (part, lines) in lines.into_iter().enumerate() {
+                    let from = first.saturating_sub(part * side).min(side);
+                    let to = (first + spread.len()).saturating_sub(part * side).min(side);
+                    for (at, taps) in (from..to).zip(&mut taps) {
+                        for (line, sum) in lines.chunks_exact(side).zip(&mut sums) {
+                            let value = T::splat(simd, line[at]);
+                            *sum = T::multiply_add(simd, *taps, value, *sum);
+                        }
                     }
                 }
-                for (line, sum) in sums.iter().enumerate() {
-                    T::registers_mut::<S>(&mut result[line * side + first..][..lanes])[0] = *sum;
+                for (line, sum) in result.chunks_exact_mut(side / lanes).zip(sums) {
+                    line[register] = sum;
                 }
             }
         }
+    }
+
+    /// How many numbers there are in a register.
+    #[inline(always)]
+    fn lanes<S: Simd>() -> usize {
+        size_of::<T::Register<S>>() / size_of::<T>()
+    }
+
+    /// For every value that the cells of a register see: by which tap each of them does.
+    #[inline(always)]
+    fn spread<S: Simd>(&self) -> Vec<T::Register<S>> {
+        let lanes = Self::lanes::<S>();
+        let taps = &self.weights[ROWS - 1..][..=2 * self.reach];
+        let mut spread = vec![T::zero(); (taps.len() + lanes - 1) * lanes];
+        for (value, taps_of) in spread.chunks_exact_mut(lanes).enumerate() {
+            for (cell, tap_of) in taps_of.iter_mut().enumerate() {
+                let tap = value.checked_sub(cell).and_then(|tap| taps.get(tap));
+                *tap_of = tap.copied().unwrap_or_default();
+            }
+        }
+        T::registers::<S>(&spread).to_vec()
     }
 
     /// The side of a brick.
@@ -283,18 +299,33 @@ struct Group<'a, T> {
     pass: &'a Pass<'a, T>,
     first: usize,
     result: &'a mut [T],
+    /// Whether there are more than 16 registers.
+    more_registers: bool,
 }
 
 impl<T: Real> Group<'_, T> {
     #[inline(always)]
     fn run<S: Simd, const SIDE: usize>(self, simd: S) {
         let pass = self.pass;
-        let mut copies = vec![T::zero(); LINES * 3 * pass.side];
+        // Closures around vector instructions would be compiled without them.
+        let spread = match pass.stride {
+            1 => pass.spread::<S>(),
+            _ => Vec::new(),
+        };
         for (i, result) in self.result.chunks_exact_mut(pass.volume).enumerate() {
             let bricks = pass.bricks(self.first + i);
-            let columns = T::registers::<S>(bricks[0]).len() / pass.side;
             if pass.stride == 1 {
-                pass.along::<S, SIDE>(simd, bricks, &mut copies, result);
+                let lines = pass.volume / pass.side;
+                if self.more_registers && lines.is_multiple_of(16) {
+                    pass.along::<S, SIDE, 16>(simd, bricks, &spread, result);
+                } else {
+                    pass.along::<S, SIDE, 8>(simd, bricks, &spread, result);
+                }
+                continue;
+            }
+            let columns = T::registers::<S>(bricks[0]).len() / pass.side;
+            if self.more_registers && columns.is_multiple_of(4) {
+                pass.across::<S, SIDE, 4>(simd, bricks, result);
             } else if columns.is_multiple_of(2) {
                 pass.across::<S, SIDE, 2>(simd, bricks, result);
             } else {

@@ -69,8 +69,13 @@ impl VectorOps for Cube {
         Self::float_sum(kernels::partial_sums(a, Some(b)))
     }
 
-    fn scaled(x: CubeTensor, a: f64) -> CubeTensor {
-        ranked!(x.shape().num_dims(), 1 2 3 4, R => down(up::<R>(x) * a))
+    fn squared_distance(a: CubeTensor, b: CubeTensor) -> CubeTensor {
+        let difference = Self::float_sub(a, b);
+        Self::inner_product(difference.clone(), difference)
+    }
+
+    fn scaled(x: CubeTensor, a: f64, dtype: DType) -> CubeTensor {
+        ranked!(x.shape().num_dims(), 1 2 3 4, R => down((up::<R>(x) * a).cast(dtype)))
     }
 
     fn spectral_filter(x: CubeTensor, filter: SpectralFilter) -> CubeTensor {

@@ -6,6 +6,8 @@ use std::str::FromStr;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::Error;
+use crate::fresh::PARALLEL_FROM;
+use crate::vector::scaled_as;
 
 /// The backends a device can belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, derive_more::Display)]
@@ -153,6 +155,12 @@ impl ComputeDevice {
     pub fn values<const R: usize>(&self, tensor: Tensor<R>) -> Result<Vec<f64>, Error> {
         let read = |e: &dyn fmt::Debug| Error::Read {
             reason: format!("{e:?}"),
+        };
+        // Burn copies what is shared three times, on one core.
+        let plain = self.kind.is_cpu() && !tensor.device().is_autodiff();
+        let tensor = match tensor.shape().num_elements() {
+            len if plain && len >= PARALLEL_FROM => scaled_as(&tensor, 1.0, DType::F64),
+            _ => tensor,
         };
         let data = tensor
             .try_into_data_dtype(DType::F64)

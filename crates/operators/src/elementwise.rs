@@ -17,10 +17,12 @@ use rayon::prelude::*;
 
 use crate::fft::{Real, is_f64};
 use crate::fresh::{PARALLEL_FROM, room, zeroed};
-use crate::slices::sum;
+use crate::slices::Sum;
 
-/// Entries per block: a handful of intermediate results fit into the first-level cache.
-const BLOCK: usize = 1 << 10;
+/// Bytes of a block of entries: a dozen of intermediate results fit into the first-level cache.
+const BLOCK: usize = 1 << 11;
+/// Entries whose sum is taken by itself.
+const SUMMED: usize = 1 << 10;
 /// Entries per task; sums are taken in this order whatever the number of threads.
 const CHUNK: usize = 1 << 14;
 
@@ -52,27 +54,14 @@ impl<'a, T: Real> Part<'a, T> {
         }
     }
 
-    fn entries(self) -> &'a mut [T] {
+    /// The entries of a block. New ones are zeros, written right before the block is, while it comes to the cache anyway.
+    #[inline(always)]
+    fn block(&mut self, start: usize, size: usize) -> &mut [T] {
         match self {
-            Self::Reused(entries) => entries,
-            Self::New(piece) => zeroed(piece),
+            Self::Reused(entries) => &mut entries[start..][..size],
+            Self::New(piece) => zeroed(&mut piece[start..][..size]),
         }
     }
-}
-
-impl<'a> Piece<'a> {
-    fn target(self) -> Target<'a> {
-        match self {
-            Self::Double(part) => Target::Double(part.entries()),
-            Self::Single(part) => Target::Single(part.entries()),
-        }
-    }
-}
-
-/// Where a block of results goes.
-enum Target<'a> {
-    Double(&'a mut [f64]),
-    Single(&'a mut [f32]),
 }
 
 impl Values {
@@ -123,29 +112,30 @@ impl Values {
     }
 }
 
-impl Target<'_> {
+impl Piece<'_> {
     /// The entries of a block, which have the type of the program.
     #[inline(always)]
     fn entries<T: Real>(&mut self, start: usize, size: usize) -> &mut [T] {
         match self {
-            Self::Double(x) => bytemuck::cast_slice_mut(&mut x[start..][..size]),
-            Self::Single(x) => bytemuck::cast_slice_mut(&mut x[start..][..size]),
+            Self::Double(x) => bytemuck::cast_slice_mut(x.block(start, size)),
+            Self::Single(x) => bytemuck::cast_slice_mut(x.block(start, size)),
         }
     }
 
+    /// Reads a block of what was an input's.
     #[inline(always)]
-    fn read<T: Real>(&self, start: usize, block: &mut [T]) {
+    fn read<T: Real>(&mut self, start: usize, block: &mut [T]) {
         match self {
-            Self::Double(x) => convert(&x[start..], block),
-            Self::Single(x) => convert(&x[start..], block),
+            Self::Double(x) => convert(x.block(start, block.len()), block),
+            Self::Single(x) => convert(x.block(start, block.len()), block),
         }
     }
 
     #[inline(always)]
     fn write<T: Real>(&mut self, start: usize, block: &[T]) {
         match self {
-            Self::Double(x) => convert(block, &mut x[start..]),
-            Self::Single(x) => convert(block, &mut x[start..]),
+            Self::Double(x) => convert(block, x.block(start, block.len())),
+            Self::Single(x) => convert(block, x.block(start, block.len())),
         }
     }
 }
@@ -224,9 +214,7 @@ fn run<'a, T: Real>(
     let machine = Machine::new(program, sources, dtypes);
     let arch = Arch::new();
     let work = |(chunk, pieces): (usize, Vec<Option<Piece>>)| {
-        let (start, pieces) = (chunk * CHUNK, pieces.into_iter());
-        let mut targets: Vec<Option<Target>> =
-            pieces.map(|piece| piece.map(Piece::target)).collect();
+        let (start, mut targets) = (chunk * CHUNK, pieces);
         arch.dispatch(|| machine.run(start..len.min(start + CHUNK), &mut targets))
     };
     let sums: Vec<Vec<f64>> = if len < PARALLEL_FROM {
@@ -244,7 +232,7 @@ fn run<'a, T: Real>(
                 };
             }
             #[allow(unsafe_code, reason = "as it says")]
-            // SAFETY: each task made targets of its pieces, which writes all of them.
+            // SAFETY: each task writes all blocks of its pieces.
             Output::Values(_) => unsafe { results[i].take_room(len) },
         }
     }
@@ -301,9 +289,9 @@ fn own_type<T: Real>() -> DType {
 impl<T: Real> Machine<'_, T> {
     /// Runs the program on some entries; returns the sums by output, zero for other outputs.
     #[inline(always)]
-    fn run(&self, entries: std::ops::Range<usize>, targets: &mut [Option<Target>]) -> Vec<f64> {
+    fn run(&self, entries: std::ops::Range<usize>, targets: &mut [Option<Piece>]) -> Vec<f64> {
         let inputs = self.sources.len();
-        let block = BLOCK.min(entries.len());
+        let block = (BLOCK / size_of::<T>()).min(entries.len());
         let mut registers = vec![T::zero(); (inputs + self.program.instructions.len()) * block];
         for (register, source) in registers.chunks_mut(block).zip(&self.sources) {
             if let Source::Single(value) = source {
@@ -311,12 +299,13 @@ impl<T: Real> Machine<'_, T> {
             }
         }
         let mut sums = vec![0.0; targets.len()];
+        let mut parts = vec![Sum::default(); targets.len()];
         for start in entries.clone().step_by(block) {
             let size = block.min(entries.end - start);
             let within = start - entries.start;
             for (register, source) in registers.chunks_mut(block).zip(&self.sources) {
                 if let Source::Reused(output) = source
-                    && let Some(target) = &targets[*output]
+                    && let Some(target) = &mut targets[*output]
                 {
                     target.read(within, &mut register[..size]);
                 }
@@ -331,15 +320,18 @@ impl<T: Real> Machine<'_, T> {
                 };
                 compute(instruction, result, operand);
             }
-            for (output, (target, total)) in
-                (self.program.outputs.iter()).zip(targets.iter_mut().zip(&mut sums))
-            {
+            let ends = (within + size).is_multiple_of(SUMMED) || start + size == entries.end;
+            let results = targets.iter_mut().zip(parts.iter_mut().zip(&mut sums));
+            for (output, (target, (part, total))) in self.program.outputs.iter().zip(results) {
                 match (output, target) {
                     (Output::Values(i), Some(target)) if !self.is_direct(*i) => {
                         target.write(within, self.operand(*i, &registers, block, start, size));
                     }
                     (Output::Sum(i), _) => {
-                        *total += sum(self.operand(*i, &registers, block, start, size));
+                        part.add(self.operand(*i, &registers, block, start, size));
+                        if ends {
+                            *total += std::mem::take(part).total();
+                        }
                     }
                     (Output::Values(_), _) => {}
                 }
@@ -443,7 +435,7 @@ mod tests {
 
     #[test]
     fn every_length_and_every_owner_gives_the_same() {
-        for len in [2, BLOCK - 1, BLOCK + 3, CHUNK, 3 * CHUNK + 17] {
+        for len in [2, BLOCK / 8 - 1, SUMMED + 3, CHUNK, 3 * CHUNK + 17] {
             let (a, b) = vectors(len);
             let expected: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b * 0.25) / a).collect();
             let total: f64 = expected.iter().map(|x| 2.0 * x).sum();

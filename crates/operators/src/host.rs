@@ -137,13 +137,22 @@ impl<B: Host> VectorOps for B {
         B::tensor(vec![sum], vec![1].into())
     }
 
-    fn scaled(x: FloatTensor<B>, a: f64) -> FloatTensor<B> {
-        let (dtype, shape) = (x.dtype(), x.shape());
+    fn squared_distance(a: FloatTensor<B>, b: FloatTensor<B>) -> FloatTensor<B> {
+        let dtype = a.dtype();
+        let (a, b) = (B::lender(a), B::lender(b));
+        let sum = in_precision!(dtype, T => {
+            slices::squared_distance::<T>(B::values(&a), B::values(&b))
+        });
+        B::tensor(vec![sum], vec![1].into())
+    }
+
+    fn scaled(x: FloatTensor<B>, a: f64, dtype: DType) -> FloatTensor<B> {
+        let (own, shape) = (x.dtype(), x.shape());
         let x = B::lender(x);
-        in_precision!(dtype, T => {
+        in_precision!(own, T => in_precision!(dtype, U => {
             let a = T::of(a);
-            B::tensor(slices::map(B::values::<T>(&x), |x| a * x), shape)
-        })
+            B::tensor(slices::map(B::values::<T>(&x), |x| U::of((a * x).double())), shape)
+        }))
     }
 
     fn spectral_filter(x: FloatTensor<B>, filter: SpectralFilter) -> FloatTensor<B> {
@@ -209,11 +218,12 @@ pub(crate) fn register_elementwise<B: Host + BackendIr>(registry: &mut CustomOpR
 
 #[cfg(feature = "flex")]
 mod flex {
-    use burn_backend::{Element, Shape, TensorData};
+    use burn_backend::{Element, Shape, TensorData, TensorMetadata};
     use burn_flex::{Flex, FlexTensor};
 
     use super::{Host, into_values};
     use crate::fft::Real;
+    use crate::slices;
 
     fn contiguous(x: FlexTensor) -> FlexTensor {
         if x.is_contiguous() {
@@ -250,6 +260,12 @@ mod flex {
 
         fn changed<T: Real + Element>(x: FlexTensor, f: impl FnOnce(&mut [T])) -> FlexTensor {
             let mut x = contiguous(x);
+            if !x.is_unique() {
+                let shape = x.shape();
+                let mut values = slices::map(Self::values::<T>(&x), |x| x);
+                f(&mut values);
+                return Self::tensor(values, shape);
+            }
             let (start, end) = x.layout().contiguous_offsets().expect("x is contiguous");
             f(&mut x.storage_mut::<T>()[start..end]);
             x

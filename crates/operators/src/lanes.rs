@@ -1,6 +1,6 @@
 //! Vector registers of either precision.
 
-use pulp::Simd;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Numbers that vector registers hold side by side.
 pub trait Lanes: Copy {
@@ -71,3 +71,33 @@ lanes!(
     splat_f32s,
     mul_add_e_f32s
 );
+
+/// Whether the processor has the 32 registers of AVX-512, of which [`dispatch`] takes the width of AVX2.
+pub(crate) fn has_more_registers(arch: Arch) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if matches!(arch, Arch::V3(_)) {
+        return is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512dq");
+    }
+    let _ = arch;
+    false
+}
+
+/// Runs work with the best instructions that the processor has. Where that is AVX-512, registers are as wide as those of AVX2, and twice as many: results
+/// are the same.
+pub(crate) fn dispatch<W: WithSimd>(arch: Arch, work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Arch::V3(simd) = arch
+        && has_more_registers(arch)
+    {
+        #[allow(unsafe_code, reason = "the compiler cannot know the processor")]
+        // SAFETY: the processor has them.
+        return unsafe { with_more_registers(simd, work) };
+    }
+    arch.dispatch(work)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2")]
+fn with_more_registers<W: WithSimd>(simd: pulp::x86::V3, work: W) -> W::Output {
+    work.with_simd(simd)
+}

@@ -24,7 +24,7 @@
 //! | [`brick_pass`] | `y_a = sum t_b x_{a + b e}` on active bricks, along one axis `e` | its transpose |
 //! | [`tabulated`] | `y_a = F^(k)(w_a)`, `F` a quintic Hermite table | the same operation with `k + 1` |
 //! | [`spectral_filter`] | `y = F^-1[symbol F[x]]` | none (preconditioners) |
-//! | [`inner_product`], [`scaled`], [`add_scaled`], [`combined`] | `sum a b`, `a x`, `x + alpha y`, `a x + b y` | none (iterative solvers) |
+//! | [`inner_product`], [`squared_distance`], [`scaled`], [`add_scaled`], [`combined`] | `sum a b`, `sum (a - b)^2`, `a x`, `x + alpha y`, `a x + b y` | none (iterative solvers) |
 //! | [`update_on_host`] | a vector changed by a computation on the host | none (iterative solvers) |
 //! | [`retract`], [`extrapolate`] | motions in the variable `atanh u` | none (line searches) |
 //!
@@ -94,7 +94,7 @@ pub use table::{COEFFICIENTS, HermiteTable, TableRange};
 pub use tensor::{brick_convolution, brick_pass, circular_convolution, tabulated};
 pub use vector::{
     HostUpdate, Motion, SharedUpdate, VectorOps, add_scaled, combined, extrapolate, inner_product,
-    retract, scaled, spectral_filter, update_on_host,
+    retract, scaled, scaled_as, spectral_filter, squared_distance, update_on_host,
 };
 
 /// Reproducible numbers in `[-1/2, 1/2)`.

@@ -122,8 +122,10 @@ pub enum Motion {
 pub trait VectorOps: Backend {
     /// `sum a b`, shape `[1]`; accumulated and returned in double precision on a CPU.
     fn inner_product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
-    /// `a x`
-    fn scaled(x: FloatTensor<Self>, a: f64) -> FloatTensor<Self>;
+    /// `sum (a - b)^2`, likewise.
+    fn squared_distance(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// `a x`, in this precision.
+    fn scaled(x: FloatTensor<Self>, a: f64, dtype: DType) -> FloatTensor<Self>;
     /// [`spectral_filter`] on primitives.
     fn spectral_filter(x: FloatTensor<Self>, filter: SpectralFilter) -> FloatTensor<Self>;
     /// A vector moved by another.
@@ -148,12 +150,21 @@ pub fn spectral_filter<const R: usize>(x: Tensor<R>, filter: &SpectralFilter) ->
     Tensor::from_dispatch(<Dispatch as VectorOps>::spectral_filter(x, filter))
 }
 
+/// `sum (a - b)^2` as a tensor of one element, accumulated and returned in double precision on a CPU.
+pub fn squared_distance<const R: usize>(a: &Tensor<R>, b: &Tensor<R>) -> Tensor<1> {
+    let (a, b) = (a.clone().into_dispatch(), b.clone().into_dispatch());
+    Tensor::from_dispatch(<Dispatch as VectorOps>::squared_distance(a, b))
+}
+
 /// `a x`
 pub fn scaled<const R: usize>(x: &Tensor<R>, a: f64) -> Tensor<R> {
-    Tensor::from_dispatch(<Dispatch as VectorOps>::scaled(
-        x.clone().into_dispatch(),
-        a,
-    ))
+    scaled_as(x, a, x.dtype())
+}
+
+/// `a x`, computed in the precision of `x` and rounded to another one.
+pub fn scaled_as<const R: usize>(x: &Tensor<R>, a: f64, dtype: DType) -> Tensor<R> {
+    let x = x.clone().into_dispatch();
+    Tensor::from_dispatch(<Dispatch as VectorOps>::scaled(x, a, dtype))
 }
 
 /// `x + alpha y`, in place on a CPU if nobody else holds `x`.

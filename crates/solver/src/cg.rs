@@ -1,7 +1,7 @@
 //! Truncated, preconditioned conjugate gradients.
 
 use burn::tensor::{DType, Tensor};
-use operators::{ComputeDevice, add_scaled, inner_product, scaled};
+use operators::{ComputeDevice, add_scaled, inner_product, scaled, scaled_as};
 
 use crate::Error;
 
@@ -64,7 +64,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
         dtype,
         unit,
     } = quadratic;
-    let mut residual = gradient.clone().neg().cast(dtype);
+    let mut residual = scaled_as(gradient, -1.0, dtype);
     let z = precondition(&residual);
     let mut rz = dot(&residual, &z, device)?;
     let target = (limits.tolerance * limits.tolerance * rz).max(limits.least);
@@ -100,7 +100,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     // Negative curvature at once: the preconditioned steepest descent is still a descent direction. It carries the unit of
     // the energy, which conjugate gradients divide out otherwise.
     let direction = solution.unwrap_or_else(|| direction * unit.recip());
-    let direction = direction.cast(gradient.dtype());
+    let direction = scaled_as(&direction, 1.0, gradient.dtype());
     let slope = dot(gradient, &direction, device)?;
     Ok(CgSolution {
         direction,

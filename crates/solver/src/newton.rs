@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::ops::RangeInclusive;
 
 use burn::tensor::Tensor;
-use operators::{ComputeDevice, retract};
+use operators::{ComputeDevice, add_scaled, retract, squared_distance};
 use serde::{Deserialize, Serialize};
 
 use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
@@ -352,8 +352,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// The sum of the squares of the motion so far.
     fn motion(&self, point: &Point<D>) -> Result<f64, Error> {
-        let motion = point.u.clone() - self.previous.clone();
-        dot(&motion, &motion, self.device)
+        let square = squared_distance(&point.u, self.previous);
+        Ok(self.device.scalar(square)?)
     }
 
     /// The stop test: `sqrt(-g . p / N)` against the root mean square of the motion. Invariant under scaling of the
@@ -390,7 +390,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         for _ in 0..ROUNDS {
             let solution = self.solve(&point, limits, Level::Phase)?;
             // The full step nearly always lowers the energy: it is evaluated with its gradient at once.
-            let full = point.u.clone() - solution.direction.clone() * solution.slope.signum();
+            let sign = -solution.slope.signum();
+            let full = add_scaled(point.u.clone(), &solution.direction, sign);
             let next = match self.trial(full)? {
                 Some(next) if next.energy < point.energy => next,
                 _ => match self.straight(&point, &solution, 0.05..=0.5, 0.0)? {
@@ -421,7 +422,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
     ) -> Result<Option<(Place<D>, f64)>, Error> {
         let (mut t, sign) = (*parts.end(), -solution.slope.signum());
         while t >= *parts.start() {
-            let u = point.u.clone() + solution.direction.clone() * (sign * t);
+            let u = add_scaled(point.u.clone(), &solution.direction, sign * t);
             if let Some(place) = self.place(u)? {
                 let energy = self.energy(&place)?;
                 if energy < point.energy - sufficient * t * solution.slope.abs() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{Slice, Tensor};
 use geometry::Field;
-use operators::{extrapolate, inner_product};
+use operators::{extrapolate, inner_product, squared_distance};
 
 use crate::euler::{Euler, StepTo};
 use crate::{DeviceField, Error, Memory, Problem, Start, StartKind, State};
@@ -83,11 +83,11 @@ pub(crate) fn of<const D: usize>(
 /// moves an extrapolation can end in the valley of another minimizer, even close a hole.
 fn moved_little<const D: usize>(now: &DeviceField<D>, previous: &Tensor<D>) -> Result<bool, Error> {
     const FAR: f64 = 0.5;
-    let current = now.values();
-    let square = |x: &Tensor<D>| now.device().scalar(inner_product(x, x));
+    let (current, device) = (now.values(), now.device());
     // A displacement d is the motion (1 - u^2) 3 d / (4 eps).
-    let motion = square(&(current.clone() - previous.clone()))?;
-    let profile = square(&((current.clone() * current.clone()).neg() + 1.0))?;
+    let motion = device.scalar(squared_distance(current, previous))?;
+    let profile = (current.clone() * current.clone()).neg() + 1.0;
+    let profile = device.scalar(inner_product(&profile, &profile))?;
     Ok(motion < FAR * FAR * profile)
 }
 
