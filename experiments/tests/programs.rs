@@ -125,7 +125,7 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     }
     // No network was trained for this one.
     refused(CIRCLES, root.path(), &["--cells", "192"], &["n_K = 25"]);
-    refused(TRAIN, root.path(), &["--only", "n1024"], &["n1024", "n128"]);
+    refused(TRAIN, root.path(), &["--only", "n2048"], &["n2048", "n128"]);
     for program in [CROSS, MCF_CROSS, RECTANGLE] {
         refused(
             program,
