@@ -164,10 +164,12 @@ impl FairOptions {
         own.keeps_volume = volume == Some(SizeTarget::Keep);
         own.drives_volume = matches!(volume, Some(SizeTarget::To(_))) || reduced_volume.is_some();
         for change in changes {
+            // Vertices that stay do so in the file, too.
+            let stays = matches!(change, surfaces::Warning::Stay { .. });
             watcher.warning(&Warning::Mended {
                 path: path.clone(),
                 change,
-                only_for_flow: !self.remesh,
+                only_for_flow: !self.remesh && !stays,
             });
         }
         if own.fairing().noise > 0.0 && own.drives_volume {

@@ -483,6 +483,51 @@ impl OwnMesh {
         }
     }
 
+    /// The mesh of the file, with its vertices where those of `moved` are.
+    fn written(&self, moved: &TriangleMesh) -> TriangleMesh {
+        let Loaded { mesh, places, .. } = self.loaded();
+        let ways = self.rough().mesh().vertices.iter().zip(&moved.vertices);
+        let goes: HashMap<_, _, PlaceHasher> = ways.map(|(from, to)| (key(*from), *to)).collect();
+        let vertices = mesh.vertices.iter().zip(places);
+        TriangleMesh {
+            vertices: vertices
+                .map(|(x, place)| match goes.get(&key(*place)) {
+                    Some(to) if key(*x) == key(*place) => *to,
+                    // It was joined to another one, from which it is as far as before.
+                    Some(to) => [0, 1, 2].map(|i| x[i] + (to[i] - place[i])),
+                    // Vertices of no face stay.
+                    None => *x,
+                })
+                .collect(),
+            faces: mesh.faces.clone(),
+            normals: None,
+        }
+    }
+
+    /// The moved mesh with vertices at their old places where faces of the file would cross others that did not before. Lids, and faces that are cut
+    /// apart for the flow, hide some of these from [`TriangleMesh::untangled`].
+    fn uncrossed(&self, mut moved: TriangleMesh) -> TriangleMesh {
+        let Loaded { mesh, places, .. } = self.loaded();
+        let crossed = mesh.crossing_faces();
+        loop {
+            let crosses = self.written(&moved).newly_crossing(&crossed);
+            let tangled = mesh.faces.iter().zip(&crosses).filter(|(_, new)| **new);
+            let corners = tangled.flat_map(|(face, _)| face);
+            let back: HashSet<_> = corners.map(|&v| key(places[v as usize])).collect();
+            let rough = &self.rough().mesh().vertices;
+            let mut changes = false;
+            for (x, from) in moved.vertices.iter_mut().zip(rough) {
+                if x != from && back.contains(&key(*from)) {
+                    (*x, changes) = (*from, true);
+                }
+            }
+            // Each round moves some back, until nothing is tangled.
+            if !changes {
+                return moved;
+            }
+        }
+    }
+
     /// The mesh with the vertices where the phase field `u` has taken them, or the new one in its place.
     pub fn faired(&self, start: &Stored<3>, u: &Stored<3>, eps: f64, up: UpAxis) -> Result<Faired> {
         let rough = self.rough();
@@ -537,35 +582,15 @@ impl OwnMesh {
         let free: Vec<bool> = fairing.kept.iter().map(|kept| !kept).collect();
         moved = self.bounded(moved, volume, &free);
         moved = match open {
-            Some(open) => open.untangled(&moved, rough.mesh()),
+            Some(open) => self.uncrossed(open.untangled(&moved, rough.mesh())),
             None => moved.untangled(rough.mesh()),
         };
         if moved.vertices == rough.mesh().vertices {
             edges = KeptEdges::default();
         }
         let ways = rough.mesh().vertices.iter().zip(&moved.vertices);
-        let goes: HashMap<_, _, PlaceHasher> =
-            (ways.clone().map(|(from, to)| (key(*from), *to))).collect();
         let lengths: Vec<f64> = ways.map(|(a, b)| distance(*a, *b)).collect();
-        let Loaded {
-            bytes,
-            mesh,
-            places,
-            ..
-        } = self.loaded();
-        let all = TriangleMesh {
-            vertices: (mesh.vertices.iter().zip(places))
-                .map(|(x, place)| match goes.get(&key(*place)) {
-                    Some(to) if key(*x) == key(*place) => *to,
-                    // It was joined to another one, from which it is as far as before.
-                    Some(to) => [0, 1, 2].map(|i| x[i] + (to[i] - place[i])),
-                    // Vertices of no face stay.
-                    None => *x,
-                })
-                .collect(),
-            faces: mesh.faces.clone(),
-            normals: None,
-        };
+        let all = self.written(&moved);
         let mut lost = fairing.unresolved(followed, thinnest(start.grid()));
         let mut lengths = lengths;
         let mut shown = moved.clone();
@@ -602,7 +627,7 @@ impl OwnMesh {
             surface: Surface {
                 file: Some(MeshFile {
                     format: self.extension().to_owned(),
-                    bytes: surfaces::rewrite(bytes, &self.file, &all)?,
+                    bytes: surfaces::rewrite(&self.loaded().bytes, &self.file, &all)?,
                 }),
                 mesh: all,
                 up,

@@ -61,6 +61,19 @@ impl TriangleMesh {
         crossed.into_iter().map(AtomicBool::into_inner).collect()
     }
 
+    /// The faces that cross others and are not among those that did before, and the faces that they cross.
+    pub fn newly_crossing(&self, before: &[bool]) -> Vec<bool> {
+        let mut new = self.crossing_faces();
+        for (new, before) in new.iter_mut().zip(before) {
+            *new &= !before;
+        }
+        if new.contains(&true) {
+            self.crossing_among(|a, b| new[a] || new[b])
+        } else {
+            new
+        }
+    }
+
     /// The mesh with those vertices nearer to where they were in `before`, a mesh of the same faces, whose faces cross others now and did not cross any
     /// there: in the end at their old places. So no face crosses others that did not before. If `before` crosses itself in so many places that this leaves
     /// nothing, the result is the one with the fewest faces that cross others, fewer than in `before`.

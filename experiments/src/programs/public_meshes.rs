@@ -255,15 +255,18 @@ fn figure(rows: &[Row]) -> Figure {
                 let series = Series::new(fate.name(), points.clone()).with_colour(colour);
                 (!points.is_empty()).then(|| series.with_symbols(Marker::Circle))
             });
-        chart.with_curves(series.collect::<Vec<_>>())
+        // None of a few meshes may have been faired.
+        let series: Vec<_> = series.collect();
+        (!series.is_empty()).then(|| chart.with_curves(series))
     };
     let seconds = panel("seconds", &|row| Some(row.seconds));
     let moved = panel("moved, % of the longest side", &|row| {
         Some(row.result.as_ref()?.displacement)
     });
     let title = "Public test meshes, taken by willmore fair";
-    Figure::new(title, 2)
-        .with_panels([seconds, moved])
+    let panels: Vec<_> = [seconds, moved].into_iter().flatten().collect();
+    Figure::new(title, panels.len())
+        .with_panels(panels)
         .with_shared_legend()
 }
 
