@@ -517,7 +517,7 @@ impl OwnMesh {
             let rough = &self.rough().mesh().vertices;
             let mut changes = false;
             for (x, from) in moved.vertices.iter_mut().zip(rough) {
-                if x != from && back.contains(&key(*from)) {
+                if key(*x) != key(*from) && back.contains(&key(*from)) {
                     (*x, changes) = (*from, true);
                 }
             }
