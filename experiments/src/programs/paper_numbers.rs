@@ -174,7 +174,7 @@ fn sheet<'a>(rows: &'a [Compared<'_>]) -> Sheet<'a, Compared<'a>> {
         .column("here / paper", Shortest, |row| row.ratio().map(four_digits))
         .text("our result", |row| row.printed.folder)
         .text("metric", |row| row.printed.metric)
-        .text("why they differ by more than a tenth", |row| row.reason())
+        .text("why they differ by more than a tenth", Compared::reason)
 }
 
 /// A number with four significant digits.
