@@ -81,8 +81,8 @@ struct Point<const D: usize> {
 const POOR: f64 = 0.01;
 /// So many of them in a row end a minimization that holds sizes.
 const MOST_POOR: usize = 2;
-/// A single one ends it where the estimated distance to the minimum is larger than this part of the motion, and the tolerance is not much smaller:
-/// a shorter step then reaches its minimum in fewer Newton steps than the rest of this one takes.
+/// A single one ends it where the estimated distance to the minimum is larger than this part of the motion. Then a shorter time step is cheaper than to go
+/// on. A tolerance that is a hundred times smaller asks for many Newton steps anyway, and there two are needed.
 const FAR: f64 = 0.1;
 /// Parts of a Newton step that are tried on a straight line.
 const STRAIGHT: RangeInclusive<f64> = 1e-6..=1.0;

@@ -13,8 +13,9 @@ use crate::{Error, TriangleMesh};
 /// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
 ///
 /// There may be several components. Those that lie inside others and are oriented inwards bound
-/// cavities. A [union](ClosedMesh::bodies) has several bodies that overlap. Other intersections of faces are not looked for: where a surface crosses itself, inside and
-/// outside are not defined, and no error tells so.
+/// cavities. A [union](ClosedMesh::bodies) has several bodies that overlap. Other intersections of
+/// faces are not looked for: where a surface crosses itself, inside and outside are not defined, and
+/// no error tells so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosedMesh {
     mesh: TriangleMesh,

@@ -128,7 +128,7 @@ pub enum Error {
         faces: usize,
     },
     #[error(
-        "the surface has {parts} loose parts and {holes} holes, more than {most}, so many as are closed one by one: join its faces"
+        "the surface has {parts} loose parts and {holes} holes, of which at most {most} are closed one by one: join its faces"
     )]
     Loose {
         parts: usize,

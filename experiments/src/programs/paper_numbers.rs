@@ -145,7 +145,7 @@ impl Compared<'_> {
     fn require_reason(&self) -> Result<()> {
         let Printed { row, what, .. } = self.printed;
         let message = format!(
-            "row {row}, {what}: ours is {:.3} times the paper's, and the list says not why",
+            "row {row}, {what}: ours is {:.3} times the paper's, and the list gives no reason",
             self.ratio().unwrap_or(f64::NAN)
         );
         require(self.is_close() || !self.printed.reason.is_empty(), message)
