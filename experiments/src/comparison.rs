@@ -169,14 +169,15 @@ fn compare(setting: &Setting, options: &Options) -> Result<()> {
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
     let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
     let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
-    let variants = options.study.variants(flow, stable);
+    let variants = options.study.variants(flow, stable)?;
     let study = Study::new(&options.study.networks, &variants)?;
-    let message = "no method is left: choose other --methods, --scheme or --cells";
+    let message = "no method is left: choose other --methods, --scheme, --cells or --without";
     require(!study.plan.is_empty(), message)?;
     let parameters = json!({
         "shape": setting.shape, "flow": flow, "side": setting.sample.side,
         "cells": cells, "reference_n": reference_n, "reference_steps_per_step": setting.reference_ratio,
         "eps": EPS, "time_step": STEP, "steps": steps, "networks": study.checksums(),
+        "runs": study.variants().collect::<Vec<_>>(),
     });
     let mut session = Session::open(setting.program, &options.study.run, parameters)?;
     let marks: Vec<_> = sampled(steps).skip(1).map(|k| (k, time(k))).collect();

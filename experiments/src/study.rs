@@ -31,6 +31,11 @@ pub struct StudyOptions {
     /// the accurate recipe [default: all]
     #[arg(long = "scheme", value_name = "NAME", value_enum)]
     pub formulation: Option<Formulation>,
+
+    /// Leave out all whose name FLOW.nN.METHOD, as in summaries, begins like this, such as willmore.n1024 or mcf.n1024.fe;
+    /// separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub without: Vec<String>,
 }
 
 impl StudyOptions {
@@ -43,8 +48,17 @@ impl StudyOptions {
         })
     }
 
-    /// The chosen methods in their formulations at all resolutions; without a choice those that are `usual` at a resolution.
-    pub fn variants(&self, flow: Flow, usual: impl Fn(Method, usize) -> bool) -> Vec<Variant> {
+    /// The chosen methods in their formulations at all resolutions but for those that are left out; without a choice of methods
+    /// those that are `usual` at a resolution.
+    ///
+    /// # Errors
+    ///
+    /// A name of this flow leaves nothing out.
+    pub fn variants(
+        &self,
+        flow: Flow,
+        usual: impl Fn(Method, usize) -> bool,
+    ) -> Result<Vec<Variant>> {
         let chosen = |method: Method, n: usize| match &self.methods[..] {
             [] => usual(method, n),
             methods => methods.contains(&method),
@@ -57,7 +71,19 @@ impl StudyOptions {
                 variants.extend(cells.map(|n| Variant::new(flow, discretization, n)));
             }
         }
-        variants
+        let of_another = |name: &str| {
+            let mut others = Flow::ALL.into_iter().filter(|other| *other != flow);
+            others.any(|other| name.starts_with(&other.to_string()))
+        };
+        for name in self.without.iter().filter(|name| !of_another(name)) {
+            let all = variants.len();
+            variants.retain(|variant| !format!("{flow}.{}", variant.key()).starts_with(name));
+            require(
+                variants.len() < all,
+                format!("--without {name} leaves nothing out"),
+            )?;
+        }
+        Ok(variants)
     }
 }
 

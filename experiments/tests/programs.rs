@@ -125,6 +125,10 @@ fn resolutions_names_and_outputs_that_cannot_be() {
     }
     // No network was trained for this one.
     refused(CIRCLES, root.path(), &["--cells", "192"], &["n_K = 25"]);
+    for name in ["n128", "mcf.n77"] {
+        let without = ["--quick", "--without", name];
+        refused(CIRCLES, root.path(), &without, &[name, "nothing"]);
+    }
     refused(TRAIN, root.path(), &["--only", "n2048"], &["n2048", "n128"]);
     for program in [CROSS, MCF_CROSS, RECTANGLE] {
         refused(

@@ -32,7 +32,8 @@ pub const EXPERIMENT: Experiment = Experiment {
                 ),
             ],
             options: Some(
-                "--cells 64,128,256,512,1024 --methods hybrid,fe_implicit,fe_semi --elements-up-to 512",
+                "--cells 64,128,256,512,1024 --methods hybrid,fe_implicit,fe_semi \
+                 --without mcf.n1024.fe,willmore.n1024,willmore.n512.fe_implicit_calibrated",
             ),
         },
         ResultFolder {
@@ -108,11 +109,6 @@ struct Options {
     #[command(flatten)]
     study: StudyOptions,
 
-    /// Leave nested finite elements of Willmore flow, which --full or --methods asks for, out above this resolution; a circle takes
-    /// minutes at n = 256
-    #[arg(long, value_name = "N")]
-    elements_up_to: Option<usize>,
-
     /// Take some of the 30 circles only, evenly chosen
     #[arg(long, value_name = "COUNT")]
     circles: Option<usize>,
@@ -127,14 +123,13 @@ fn program(options: &Options) -> Result<()> {
     require((1..=most).contains(&count), message)?;
     // Nested finite elements take hours; everything else together some minutes.
     let usual = |method: Method, _| method.is_learned() || options.study.full;
-    let limit = options.elements_up_to.unwrap_or(usize::MAX);
-    let mut willmore = options.study.variants(Flow::Willmore, usual);
-    willmore.retain(|variant| variant.discretization.method.is_learned() || variant.n <= limit);
-    let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true);
+    let willmore = options.study.variants(Flow::Willmore, usual)?;
+    let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true)?;
     let variants = [mean_curvature, willmore].concat();
     let study = Study::new(&options.study.networks, &variants)?;
     let has = |flow| study.variants().any(|variant| variant.flow == flow);
-    let message = "no method is left for one of the two flows: choose other --methods, --scheme or --elements-up-to";
+    let message =
+        "no method is left for one of the two flows: choose other --methods, --scheme or --without";
     require(Flow::ALL.into_iter().all(has), message)?;
     let parameters = json!({
         "cells": study.cells, "runs": study.variants().collect::<Vec<_>>(), "networks": study.checksums(),
