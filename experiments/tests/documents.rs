@@ -144,6 +144,21 @@ fn every_metric_is_explained_and_every_explanation_is_of_a_metric() {
     }
 }
 
+/// Of results that are made anew, `paper_numbers` is made after them.
+#[test]
+fn the_numbers_beside_those_of_the_paper_are_those_of_the_summaries() {
+    let summaries = summaries();
+    let list = read("experiments/paper_numbers.txt");
+    let rows = list.lines().filter(|line| !line.starts_with('#'));
+    for (row, line) in (1..).zip(rows) {
+        let fields: Vec<&str> = line.split('|').map(str::trim).collect();
+        let (folder, metric) = fields[4].split_once(' ').unwrap();
+        let shown = summaries["paper_numbers"].get(&format!("row{row}.here"));
+        let found = summaries[folder].get(metric);
+        assert_eq!(shown, found, "run paper_numbers again: row {row}, {line}");
+    }
+}
+
 /// A table is checked if the head of its last column is "metric". Its cells hold the folder of the results and the metric; words in
 /// capitals stand for the code or the last word in the head of the column. A metric without capitals is that of the column before.
 #[test]

@@ -175,14 +175,14 @@ impl FairOptions {
         if own.fairing().noise > 0.0 && own.drives_volume {
             return Err(Refusal::NoiseAndVolume.into());
         }
-        if noise.is_none() {
-            let noise = own.fairing().noise;
+        if let Some(estimate) = own.noise_estimate() {
+            let noise = estimate.deviation;
             if noise == 0.0 {
                 return Err(Refusal::NoNoise.into());
             }
             let longest_side = own.rough().bounding_box().longest_side();
             // What is left of noise by a repair is in longer waves, as a shape is.
-            if !repairs && noise > LITTLE * longest_side && !own.shows_noise() {
+            if !repairs && noise > LITTLE * longest_side && estimate.is_shape {
                 return Err(Refusal::NoiseOfShape {
                     percent: 100.0 * noise / longest_side,
                 }
@@ -190,11 +190,11 @@ impl FairOptions {
             }
             watcher.note(&Note::Noise {
                 noise,
-                longest_side: own.rough().bounding_box().longest_side(),
+                longest_side,
             });
-            let flat = own.rough().mesh().flat_part(noise);
-            if flat > FLAT {
-                watcher.warning(&Warning::Flat { part: flat });
+            if estimate.flat_part > FLAT {
+                let part = estimate.flat_part;
+                watcher.warning(&Warning::Flat { part });
             }
             self.noise = Some(noise);
         }

@@ -4,7 +4,9 @@ use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use engine::DISPLACEMENT;
-use surfaces::{Bound, Covered, Edges, FairedMesh, Followed, KeptEdges, Mended, PlaceHasher};
+use surfaces::{
+    Bound, Covered, Edges, FairedMesh, Followed, KeptEdges, Mended, NoiseEstimate, PlaceHasher,
+};
 
 use crate::faired::{Displacement, Faired, MeshReport, surface};
 use crate::keep;
@@ -62,6 +64,8 @@ struct Loaded {
     mask: Option<Vec<u8>>,
     /// The distance of what stays.
     keep: Option<Box<dyn SignedDistance<3>>>,
+    /// What was found where the noise was not given.
+    estimate: Option<NoiseEstimate>,
     fairing: Fairing,
     /// The vertices in the box, once the start of the flow is known.
     followed: OnceLock<Followed>,
@@ -83,7 +87,6 @@ struct OpenSurface {
     is_unsure: bool,
     /// Parts that have no lids, and stay as they are.
     left: TriangleMesh,
-    noise: f64,
 }
 
 impl OpenSurface {
@@ -96,7 +99,6 @@ impl OpenSurface {
             unsure: covered.unsure.iter().map(|x| key(*x)).collect(),
             is_unsure: covered.is_unsure,
             left: covered.left.clone(),
-            noise: covered.noise(),
         }
     }
 
@@ -145,6 +147,14 @@ impl OpenSurface {
     }
 
     /// The surface alone.
+    /// The noise of the surface without its lids. Creases at its boundary are none.
+    fn noise(&self, mesh: &TriangleMesh) -> NoiseEstimate {
+        if self.creases.is_empty() {
+            return mesh.noise_of_first(self.vertices);
+        }
+        self.without_lids(mesh).noise()
+    }
+
     fn without_lids(&self, mesh: &TriangleMesh) -> TriangleMesh {
         TriangleMesh {
             vertices: mesh.vertices[..self.vertices].to_vec(),
@@ -205,11 +215,13 @@ impl OwnMesh {
             changes,
             places,
         } = mended;
-        let is_estimated = self.noise.is_nan();
-        if is_estimated {
-            self.noise = open
-                .as_ref()
-                .map_or_else(|| closed.mesh().noise(), |open| open.noise);
+        let find = || match &open {
+            None => closed.mesh().noise(),
+            Some(open) => open.noise(closed.mesh()),
+        };
+        let estimate = self.noise.is_nan().then(find);
+        if let Some(estimate) = estimate {
+            self.noise = estimate.deviation;
         }
         let keep = self.keep.as_deref();
         let keep = keep.map(|text| keep::parse(text, mask.as_deref(), &mesh, &bytes, &self.file));
@@ -221,8 +233,8 @@ impl OwnMesh {
             .map_or(0, |open| closed.mesh().vertices.len() - open.vertices);
         let mut fairing =
             Fairing::with_lids(closed, self.noise, stays, lids).with_edges(self.edges);
-        if is_estimated {
-            fairing = fairing.with_found_noise(self.noise);
+        if let Some(estimate) = estimate {
+            fairing = fairing.with_found_noise(estimate.deviation);
         }
         // Where it is not known what the surface bounds, vertices may follow another one than theirs.
         let is_unsure = open.as_ref().is_some_and(|open| open.is_unsure);
@@ -253,6 +265,7 @@ impl OwnMesh {
             open,
             mask,
             keep,
+            estimate,
             fairing,
             followed: OnceLock::new(),
         }));
@@ -406,14 +419,9 @@ impl OwnMesh {
         self.loaded().open.is_some()
     }
 
-    /// Whether what looks like noise is noise, and not the shape.
-    pub fn shows_noise(&self) -> bool {
-        let rough = self.rough().mesh();
-        match &self.loaded().open {
-            None => rough.shows_noise(usize::MAX),
-            Some(open) if open.creases.is_empty() => rough.shows_noise(open.vertices),
-            Some(open) => open.without_lids(rough).shows_noise(usize::MAX),
-        }
+    /// The noise of the surface where it was not given.
+    pub fn noise_estimate(&self) -> Option<NoiseEstimate> {
+        self.loaded().estimate
     }
 
     /// What becomes of the vertices.

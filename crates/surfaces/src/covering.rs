@@ -55,22 +55,6 @@ pub struct Covered {
     pub left: TriangleMesh,
 }
 
-impl Covered {
-    /// The standard deviation of the noise of the surface, as [`TriangleMesh::noise`]. Creases at its boundary are none.
-    pub fn noise(&self) -> f64 {
-        let mesh = self.mended.mesh.mesh();
-        if self.creases.is_empty() {
-            return mesh.noise_of_first(self.vertices);
-        }
-        let surface = TriangleMesh {
-            vertices: mesh.vertices[..self.vertices].to_vec(),
-            faces: mesh.faces[..self.faces].to_vec(),
-            normals: None,
-        };
-        surface.noise()
-    }
-}
-
 impl ClosedMesh {
     /// A surface that bounds nothing with [lids](TriangleMesh::with_lids) on its holes, which is mended where exact coordinates and the neighbours of
     /// faces say how.

@@ -187,7 +187,10 @@ impl Fairing {
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
     pub fn time(&self, spacing: f64, scale: f64) -> f64 {
         let edge = scale * self.rough.mesh().mean_edge();
-        let find = || self.rough.mesh().noise_of_first(self.surface());
+        let find = || {
+            let estimate = self.rough.mesh().noise_of_first(self.surface());
+            estimate.deviation
+        };
         let found = *self.found.get_or_init(find);
         let is_beyond = self.noise > BEYOND * found;
         let most = if is_beyond { TIME_BEYOND } else { TIME };

@@ -1,6 +1,7 @@
 //! Lists of triangles.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use chacha20::ChaCha8Rng;
@@ -272,7 +273,8 @@ pub(crate) fn angle_weighted_normals(vertices: &[Vector], faces: &[[u32; 3]]) ->
     let at_corners = |face: &[u32; 3]| {
         let triangle = face.map(|v| vertices[v as usize]);
         let normal = scaled_normal(triangle).normalize_or_zero();
-        [0, 1, 2].map(|i| normal * angle(&triangle, i))
+        let [first, second] = [0, 1].map(|corner| angle(&triangle, corner));
+        [first, second, PI - first - second].map(|angle| normal * angle)
     };
     let mut normals = vec![Vector::ZERO; vertices.len()];
     let mut weighted = Vec::new();

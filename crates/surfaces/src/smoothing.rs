@@ -1,18 +1,12 @@
-//! Smoothing of meshes by their edges, and the noise that there is to smooth.
+//! Smoothing of meshes by their edges.
 
-use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::{Add, Div, Mul, Sub};
 
 use geometry::parallel;
 
-use crate::vector::{Vector, scaled_normal};
+use crate::vector::Vector;
 use crate::{Parts, TriangleMesh};
-
-/// Rounds in which the squares of noise are averaged over neighbours, some forty of them,
-const AVERAGING: usize = 12;
-/// and the root of the median of these means over that of the mean, of independent normally distributed numbers at regular vertices.
-const MEDIAN_OF_MEANS: f64 = 0.99;
 
 /// The usual factors of Taubin's smoothing of a mesh.
 pub const TAUBIN: [f64; 2] = [0.5, -0.53];
@@ -85,8 +79,13 @@ impl Umbrellas {
         Self { starts, neighbours }
     }
 
+    /// How many vertices there are.
+    pub(crate) fn count(&self) -> usize {
+        self.starts.len() - 1
+    }
+
     /// The neighbours of a vertex.
-    fn around(&self, vertex: usize) -> &[u32] {
+    pub(crate) fn around(&self, vertex: usize) -> &[u32] {
         &self.neighbours[self.starts[vertex]..self.starts[vertex + 1]]
     }
 
@@ -101,11 +100,11 @@ impl Umbrellas {
     }
 
     /// `L x = x - M x` at a vertex.
-    fn laplacian_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
+    pub(crate) fn laplacian_at<T: Smoothed>(&self, x: &[T], vertex: usize) -> T {
         x[vertex] - self.mean_at(x, vertex)
     }
 
-    fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
+    pub(crate) fn laplacian(&self, x: &[Vector]) -> Vec<Vector> {
         parallel::table(x.len(), CHUNK, Vector::ZERO, &|vertex| {
             self.laplacian_at(x, vertex)
         })
@@ -152,22 +151,6 @@ impl Umbrellas {
         }
         last
     }
-
-    /// Sum of the squares of the coefficients of `L L x` at a vertex.
-    fn squared_weights(&self, vertex: usize, weights: &mut Weights) -> f64 {
-        weights.add(vertex as u32, 1.0);
-        let around = self.around(vertex);
-        let share = 1.0 / around.len() as f64;
-        for &near in around {
-            weights.add(near, -2.0 * share);
-            let next = self.around(near as usize);
-            let part = share / next.len() as f64;
-            for &far in next {
-                weights.add(far, part);
-            }
-        }
-        weights.take_squares()
-    }
 }
 
 /// The coefficients of a polynomial in Chebyshev's polynomials `T_k`.
@@ -205,37 +188,6 @@ impl Series {
             coefficients.pop();
         }
         Self(coefficients)
-    }
-}
-
-/// Weights of vertices, of which most are zero.
-struct Weights {
-    of_vertices: Vec<f64>,
-    /// Those that are not zero.
-    known: Vec<u32>,
-}
-
-impl Weights {
-    fn none(vertices: usize) -> Self {
-        Self {
-            of_vertices: vec![0.0; vertices],
-            known: Vec::new(),
-        }
-    }
-
-    fn add(&mut self, vertex: u32, weight: f64) {
-        let sum = &mut self.of_vertices[vertex as usize];
-        if *sum == 0.0 {
-            self.known.push(vertex);
-        }
-        *sum += weight;
-    }
-
-    /// The sum of their squares; none are left.
-    fn take_squares(&mut self) -> f64 {
-        let all = self.known.drain(..);
-        all.map(|vertex| std::mem::take(&mut self.of_vertices[vertex as usize]).powi(2))
-            .sum()
     }
 }
 
@@ -382,149 +334,6 @@ impl TriangleMesh {
         let pairs = self.points().into_iter().zip(offset);
         self.on(&pairs.map(|(x, &by)| x + by).collect::<Vec<_>>())
     }
-
-    /// The standard deviation of the noise of the vertices along their normals, as far as it is independent from vertex to vertex.
-    ///
-    /// It is the root of the median over the vertices of means over their neighbours of `(n . L L x)^2`, each divided by the sum of the
-    /// squares of its coefficients: twice the Laplacian `L` takes away what varies slowly, the mean is the variance whatever the
-    /// distribution, and the median takes away what bends in few places, such as edges. A surface without noise has a
-    /// small one, by its curvature. Zero for a mesh without faces.
-    pub fn noise(&self) -> f64 {
-        self.noise_of_first(self.vertices.len())
-    }
-
-    /// The same of the first vertices alone, where others belong to lids.
-    pub(crate) fn noise_of_first(&self, count: usize) -> f64 {
-        let umbrellas = Umbrellas::of(self);
-        // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
-        let normals = self.smoothed_by(&umbrellas, 12, TAUBIN).vertex_normals();
-        let found = self.squared_noise(&umbrellas, &normals);
-        let mut squares: Vec<f64> = found.iter().map(|square| square.unwrap_or(0.0)).collect();
-        umbrellas.smooth(&mut squares, AVERAGING, [0.5, 0.0]);
-        let means = squares.iter().zip(&found).take(count);
-        let means = means.filter(|(_, at)| at.is_some());
-        let mut means: Vec<f64> = means.map(|(mean, _)| *mean).collect();
-        if means.is_empty() {
-            return 0.0;
-        }
-        let middle = means.len() / 2;
-        let (_, median, _) = means.select_nth_unstable_by(middle, f64::total_cmp);
-        median.sqrt() / MEDIAN_OF_MEANS
-    }
-
-    /// Whether the [noise](Self::noise) of the first `count` vertices is noise, and not the shape, of which a mesh without noise has some.
-    ///
-    /// Two signs tell the shape. Where it is smooth, and its polygons are few, the Laplacian `L` takes away most of it a second time, and nothing of noise:
-    /// the estimate by `n . L L x` is far below that by `n . L x`. Where it has edges between sides that are flat, half of the vertices have next to no
-    /// `n . L x`, and the mean over neighbours is that of the edges. Where sides and bands are cut into triangles, many neighbours lie in a plane, which noise
-    /// never leaves there. And a few vertices tell nothing.
-    pub fn shows_noise(&self, count: usize) -> bool {
-        /// The fewest vertices that tell noise from a shape,
-        const FEWEST: usize = 50;
-        /// the part of the edges whose faces lie in a plane that a shape made of flat pieces has,
-        const FLAT: f64 = 0.25;
-        /// and the part of the noise that is none.
-        const NOTHING: f64 = 1e-3;
-        /// The least part of the one estimate in the other, which is 0.1 and less for smooth shapes without noise,
-        const ROUGH: f64 = 0.2;
-        /// and of the root of the median of squares in that of normal numbers, which is 0.13 and less for shapes with edges.
-        const EVERYWHERE: f64 = 0.2;
-        /// The median of the square of a normal number.
-        const MEDIAN: f64 = 0.455;
-        if count.min(self.vertices.len()) < FEWEST {
-            return false;
-        }
-        let noise = self.noise_of_first(count);
-        if self.flat_edges(count, NOTHING * noise) > FLAT {
-            return false;
-        }
-        let umbrellas = Umbrellas::of(self);
-        let normals = self.smoothed_by(&umbrellas, 12, TAUBIN).vertex_normals();
-        let median = |mut values: Vec<f64>| -> f64 {
-            if values.is_empty() {
-                return 0.0;
-            }
-            let middle = values.len() / 2;
-            *values.select_nth_unstable_by(middle, f64::total_cmp).1
-        };
-        let of_order = |order: usize| {
-            let squares = self.squared_order(&umbrellas, &normals, order);
-            let mut means = squares.clone();
-            umbrellas.smooth(&mut means, AVERAGING, [0.5, 0.0]);
-            let of_surface = squares.len().min(count);
-            let of_first = |values: &[f64]| median(values[..of_surface].to_vec());
-            (of_first(&squares), of_first(&means))
-        };
-        let ((single, once), (_, twice)) = (of_order(1), of_order(2));
-        (twice / once).sqrt() >= ROUGH && (single / (MEDIAN * once)).sqrt() >= EVERYWHERE
-    }
-
-    /// The part of the edges between the first `count` vertices that both faces there lie in a plane, to this height.
-    fn flat_edges(&self, count: usize, height: f64) -> f64 {
-        let mut corners: HashMap<[u32; 2], Vector> = HashMap::with_capacity(3 * self.faces.len());
-        let (mut flat, mut all) = (0_usize, 0_usize);
-        for face in &self.faces {
-            if face.iter().any(|&v| v as usize >= count) {
-                continue;
-            }
-            let points = self.corners(*face);
-            let normal = scaled_normal(points).normalize_or_zero();
-            for i in 0..3 {
-                let edge = [face[i], face[(i + 1) % 3]];
-                if let Some(across) = corners.remove(&[edge[1], edge[0]]) {
-                    all += 1;
-                    flat += usize::from(normal.dot(across - points[i]).abs() <= height);
-                } else {
-                    corners.insert(edge, points[(i + 2) % 3]);
-                }
-            }
-        }
-        flat as f64 / all.max(1) as f64
-    }
-
-    /// `(n . L^k x)^2` at each vertex, divided by the sum of the squares of its coefficients, for one or two Laplacians.
-    fn squared_order(&self, umbrellas: &Umbrellas, normals: &[[f64; 3]], order: usize) -> Vec<f64> {
-        if order == 2 {
-            let found = self.squared_noise(umbrellas, normals);
-            return found
-                .into_iter()
-                .map(|square| square.unwrap_or(0.0))
-                .collect();
-        }
-        let once = umbrellas.laplacian(&self.points());
-        let at = |(vertex, way): (usize, &Vector)| {
-            let along = way.dot(Vector::from_array(normals[vertex]));
-            // One, and as many equal parts of one as there are neighbours.
-            let weights = 1.0 + 1.0 / umbrellas.around(vertex).len().max(1) as f64;
-            along * along / weights
-        };
-        once.iter().enumerate().map(at).collect()
-    }
-
-    /// The part of the vertices at which `|n . L L x|`, scaled as for [`Self::noise`] and with their own normals, is at most a ten-thousandth
-    /// of `noise`: these lie in a plane with their neighbours and the neighbours of those. Of a noisy mesh it is some ten-thousandth, and
-    /// large where flat sides meet in sharp edges.
-    pub fn flat_part(&self, noise: f64) -> f64 {
-        let found = self.squared_noise(&Umbrellas::of(self), &self.vertex_normals());
-        let flat = found
-            .iter()
-            .flatten()
-            .filter(|&&square| square.sqrt() <= 1e-4 * noise);
-        flat.count() as f64 / found.len().max(1) as f64
-    }
-
-    /// `(n . L L x)^2` at each vertex with the normal `n`, divided by the sum of the squares of its coefficients; none where there are too
-    /// few neighbours.
-    fn squared_noise(&self, umbrellas: &Umbrellas, normals: &[[f64; 3]]) -> Vec<Option<f64>> {
-        let twice = umbrellas.laplacian(&umbrellas.laplacian(&self.points()));
-        let mut weights = Weights::none(normals.len());
-        let mut at = |v: usize| {
-            let along = twice[v].dot(Vector::from_array(normals[v]));
-            along * along / umbrellas.squared_weights(v, &mut weights)
-        };
-        let inner = (0..normals.len()).map(|v| umbrellas.around(v).len() > 2);
-        (inner.enumerate().map(|(v, inner)| inner.then(|| at(v)))).collect()
-    }
 }
 
 #[cfg(test)]
@@ -569,35 +378,6 @@ mod tests {
             assert!(far < 20.0 * NEGLIGIBLE, "{rounds} rounds: {far}");
             let terms = Series::of_taubin(rounds, factors).0.len();
             assert!(terms <= most, "{rounds} rounds: {terms} terms");
-        }
-    }
-
-    /// Against the coefficients of `L L x` for every basis vector.
-    #[test]
-    fn weights_of_two_laplacians_are_summed() {
-        let mesh = samples::figure(48).unwrap();
-        let umbrellas = Umbrellas::of(mesh.mesh());
-        let count = mesh.mesh().vertices.len();
-        let mut weights = super::Weights::none(count);
-        for vertex in (0..count).step_by(count / 5) {
-            let mut squares = 0.0;
-            for other in 0..count {
-                let mut unit = vec![0.0; count];
-                unit[other] = 1.0;
-                // Far from both, nothing arrives.
-                let is_near = umbrellas.around(vertex).iter().any(|&near| {
-                    near as usize == other
-                        || umbrellas.around(near as usize).contains(&(other as u32))
-                });
-                if is_near || other == vertex {
-                    let once: Vec<f64> = (0..count)
-                        .map(|v| umbrellas.laplacian_at(&unit, v))
-                        .collect();
-                    squares += umbrellas.laplacian_at(&once, vertex).powi(2);
-                }
-            }
-            let found = umbrellas.squared_weights(vertex, &mut weights);
-            assert!((found - squares).abs() < 1e-14, "{found} for {squares}");
         }
     }
 }

@@ -140,7 +140,7 @@ fn between(outer: &[usize], inner: &[usize]) -> Vec<[u32; 3]> {
 /// What becomes of noise on a clean mesh, with these rules for edges. No time of the flow is made.
 fn faired<const N: usize>(clean: &TriangleMesh, rules: [Edges; N]) -> [FairedMesh; N] {
     let noisy = with_noise(clean, NOISE);
-    let fairing = Fairing::new(closed(noisy.clone()), noisy.noise(), |_| false);
+    let fairing = Fairing::new(closed(noisy.clone()), noisy.noise().deviation, |_| false);
     let grid = Grid::<3>::centred(64, 1.2).unwrap();
     let eps = 2.0 * grid.spacing();
     let placement = Placement::about([0.0; 3], 1.0).unwrap();
