@@ -630,6 +630,21 @@ fn the_quick_performance_run_measures_planes_and_solids() {
     let ms = |storage: &str| metric(&format!("armadillo.n64.{storage}.ms_per_product"));
     let ratio = metric("hvp.armadillo.n64.bricks_over_dense");
     assert!((ratio * ms("dense") / ms("bricks") - 1.0).abs() < 1e-12);
+    // The parts of the time of each flow, and of `fair`, are the whole.
+    let shares = ["--quick", "--quiet", "--shares", "--output", "shares"];
+    let shares = finished(PERFORMANCE, root.path(), &shares);
+    let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+    for (name, share) in &shares {
+        match name.split_once(".share.") {
+            Some((case, part)) if part != "new_pages" => *sums.entry(case).or_default() += share,
+            _ => {}
+        }
+    }
+    assert!(sums.len() > 2, "{shares:?}");
+    assert!(
+        sums.values().all(|sum| (sum - 1.0).abs() < 1e-9),
+        "{sums:?}"
+    );
     let odd = ["--surface-cells", "100"];
     refused(PERFORMANCE, root.path(), &odd, &["multiples of 8"]);
 }

@@ -181,14 +181,15 @@ where
             backend,
         });
     }
-    let program = if registry.known.contains(ELEMENTWISE) {
+    let mut program = if registry.known.contains(ELEMENTWISE) {
         program.fused()
     } else {
         program.clone()
     };
     let mut it = TensorInterpreter::with_custom_ops(device.clone(), registry.handlers.clone());
-    for (t, data) in &program.sources.constants {
-        it.register_tensor_data_id(t.id, data.clone());
+    // Constants can be as large as fields: they are kept once.
+    for (t, data) in std::mem::take(&mut program.sources.constants) {
+        it.register_tensor_data_id(t.id, data);
     }
     for operation in &program.constant {
         it.register_op(operation.clone());

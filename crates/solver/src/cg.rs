@@ -23,6 +23,11 @@ pub(crate) struct CgSolution<const D: usize> {
     pub iterations: usize,
     /// Whether a direction of negative curvature was met; the direction so far (or the first one) is used.
     pub negative_curvature: bool,
+}
+
+/// A solution with its residual.
+pub(crate) struct Solved<const D: usize> {
+    pub solution: CgSolution<D>,
     /// `-g - H p`, in the precision of the products.
     pub residual: Tensor<D>,
 }
@@ -57,7 +62,7 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,
     limits: CgLimits,
     device: &ComputeDevice,
-) -> Result<CgSolution<D>, Error> {
+) -> Result<Solved<D>, Error> {
     let Quadratic {
         gradient,
         product,
@@ -102,11 +107,11 @@ pub(crate) fn conjugate_gradients<const D: usize>(
     let direction = solution.unwrap_or_else(|| direction * unit.recip());
     let direction = scaled_as(&direction, 1.0, gradient.dtype());
     let slope = dot(gradient, &direction, device)?;
-    Ok(CgSolution {
+    let solution = CgSolution {
         direction,
         slope,
         iterations,
         negative_curvature,
-        residual,
-    })
+    };
+    Ok(Solved { solution, residual })
 }

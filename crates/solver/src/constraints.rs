@@ -22,7 +22,7 @@ use operators::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::cg::{CgLimits, CgSolution, Quadratic, conjugate_gradients, dot};
+use crate::cg::{CgLimits, CgSolution, Quadratic, Solved, conjugate_gradients, dot};
 use crate::region::Region;
 use crate::{DeviceField, Error};
 
@@ -479,12 +479,13 @@ impl<'a, const D: usize> Restoring<'a, D> {
             unit,
         };
         let projected = |r: &Tensor<D>| projection.apply(precondition(r));
-        let solution = conjugate_gradients(quadratic, &projected, limits, self.device)?;
+        let Solved { solution, residual } =
+            conjugate_gradients(quadratic, &projected, limits, self.device)?;
         if keep {
             self.solved = !solution.negative_curvature;
         }
         if keep && self.solved {
-            let change = projection.multipliers(&solution.residual, self.device)?;
+            let change = projection.multipliers(&residual, self.device)?;
             for (multiplier, change) in self.multipliers.iter_mut().zip(change) {
                 *multiplier += change;
             }

@@ -69,12 +69,23 @@ impl NewtonInfo {
     }
 }
 
-/// A point with its energy and gradient; the objective's own point is this one.
+/// A phase field with its energy.
 struct Point<const D: usize> {
     u: Tensor<D>,
     energy: f64,
-    gradient: Tensor<D>,
     tangent: Option<Tangent<D>>,
+}
+
+/// A point with its gradient; the objective's own point is this one.
+struct Evaluated<const D: usize> {
+    point: Point<D>,
+    gradient: Tensor<D>,
+}
+
+/// A point and the direction down from it. The gradient is gone: the points that are tried next need its memory.
+struct Descent<const D: usize> {
+    from: Point<D>,
+    solution: CgSolution<D>,
 }
 
 /// A Newton step that lowers the energy by a smaller part of its slope gains next to nothing; one to the minimum of the quadratic model gains half.
@@ -259,28 +270,35 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         }
     }
 
-    fn point(&mut self, Place { u, tangent }: Place<D>) -> Result<Point<D>, Error> {
+    fn evaluate(&mut self, Place { u, tangent }: Place<D>) -> Result<Evaluated<D>, Error> {
         let (energy, gradient) = timed(
             &self.times,
             |t| &mut t.energies,
             || self.objective.evaluate(&u),
         )?;
         self.info.gradients += 1;
-        Ok(Point {
-            u,
-            energy: energy + self.excess(tangent.as_ref()),
+        Ok(Evaluated {
+            point: Point {
+                u,
+                energy: energy + self.excess(tangent.as_ref()),
+                tangent,
+            },
             gradient: Region::project(self.region, gradient),
-            tangent,
         })
     }
 
+    /// A point again, after others.
+    fn return_to(&mut self, Point { u, tangent, .. }: Point<D>) -> Result<Evaluated<D>, Error> {
+        self.evaluate(Place { u, tangent })
+    }
+
     /// A point that may turn out to be too far: none where the mean curvature step fails, or the constraints are out of reach.
-    fn trial(&mut self, u: Tensor<D>) -> Result<Option<Point<D>>, Error> {
+    fn trial(&mut self, u: Tensor<D>) -> Result<Option<Evaluated<D>>, Error> {
         let Some(place) = self.place(u)? else {
             return Ok(None);
         };
-        match self.point(place) {
-            Ok(point) => Ok(Some(point).filter(|point| point.energy.is_finite())),
+        match self.evaluate(place) {
+            Ok(trial) => Ok(Some(trial).filter(|trial| trial.point.energy.is_finite())),
             Err(Error::Step(_)) => Ok(None),
             Err(error) => Err(error),
         }
@@ -306,10 +324,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     fn solve(
         &mut self,
-        point: &Point<D>,
+        Evaluated { point, gradient }: Evaluated<D>,
         limits: CgLimits,
         level: Level,
-    ) -> Result<CgSolution<D>, Error> {
+    ) -> Result<Descent<D>, Error> {
         let (preconditioner, device) = (self.preconditioner.as_ref(), self.device);
         let times = &self.times;
         let precondition = |r: &Tensor<D>| {
@@ -319,9 +337,8 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             };
             timed(times, |t| &mut t.preconditioner, apply)
         };
-        let gradient = &point.gradient;
         let quadratic = Quadratic {
-            gradient,
+            gradient: &gradient,
             dtype: (self.objective.product_dtype()).unwrap_or(gradient.dtype()),
             unit: self.objective.unit(),
             product: &mut |p| {
@@ -335,14 +352,17 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 let keep = level == Level::Both;
                 held.solve(quadratic, tangent, &precondition, limits, keep)?
             }
-            _ => conjugate_gradients(quadratic, &precondition, limits, device)?,
+            _ => conjugate_gradients(quadratic, &precondition, limits, device)?.solution,
         };
         self.info.hvp += solution.iterations;
         self.info.negative_curvature += usize::from(solution.negative_curvature);
         if !solution.slope.is_finite() {
             return Err(Error::non_finite(0, "search direction"));
         }
-        Ok(solution)
+        Ok(Descent {
+            from: point,
+            solution,
+        })
     }
 
     /// The smallest difference of energies that means anything.
@@ -376,7 +396,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// A few preconditioned iterations on the new Hessian: they remove the stiff error that a long step leaves in the
     /// profile, before the energy is compared.
-    fn clean(&mut self, mut point: Point<D>) -> Result<Point<D>, Error> {
+    fn clean(&mut self, mut evaluated: Evaluated<D>) -> Result<Evaluated<D>, Error> {
         const ROUNDS: usize = 3;
         const WORTHWHILE: f64 = 0.05;
         let limits = CgLimits {
@@ -385,31 +405,27 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
             iterations: self.params.cleanup_iterations,
         };
         if limits.iterations == 0 {
-            return Ok(point);
+            return Ok(evaluated);
         }
         for _ in 0..ROUNDS {
-            let solution = self.solve(&point, limits, Level::Phase)?;
+            let Descent { from, solution } = self.solve(evaluated, limits, Level::Phase)?;
             // The full step nearly always lowers the energy: it is evaluated with its gradient at once.
             let sign = -solution.slope.signum();
-            let full = add_scaled(point.u.clone(), &solution.direction, sign);
+            let full = add_scaled(from.u.clone(), &solution.direction, sign);
             let next = match self.trial(full)? {
-                Some(next) if next.energy < point.energy => next,
-                _ => match self.straight(&point, &solution, 0.05..=0.5, 0.0)? {
-                    Some((place, _)) => self.point(place)?,
-                    None => {
-                        // The objective's own point is another by now.
-                        let Point { u, tangent, .. } = point;
-                        return self.point(Place { u, tangent });
-                    }
+                Some(next) if next.point.energy < from.energy => next,
+                _ => match self.straight(&from, &solution, 0.05..=0.5, 0.0)? {
+                    Some((place, _)) => self.evaluate(place)?,
+                    None => return self.return_to(from),
                 },
             };
-            let worthwhile = point.energy - next.energy > WORTHWHILE * point.energy.abs();
-            point = next;
-            if !worthwhile {
+            let gain = from.energy - next.point.energy;
+            evaluated = next;
+            if gain <= WORTHWHILE * from.energy.abs() {
                 break;
             }
         }
-        Ok(point)
+        Ok(evaluated)
     }
 
     /// Backtracks from the longest of these parts of a step along the straight line until the energy falls by `sufficient * t * slope`.
@@ -436,10 +452,10 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// Newton's method with the preconditioner, from the better of `start` and the previous phase field.
     fn preconditioned(&mut self, start: &Tensor<D>) -> Result<End<D>, Error> {
-        let mut point = self.better_start(start)?;
+        let mut evaluated = self.better_start(start)?;
         let mut progress = Progress::default();
         while self.info.newton < self.params.newton_iterations {
-            let motion = self.motion(&point)?;
+            let motion = self.motion(&evaluated.point)?;
             let accuracy = self.params.linear_accuracy.unwrap_or(0.0);
             let limits = CgLimits {
                 tolerance: self.params.cg_tolerance,
@@ -447,65 +463,65 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
                 iterations: self.params.cg_iterations,
             };
             if let Some(preconditioner) = &mut self.preconditioner {
-                let follow = || preconditioner.follow(&point.u, self.device, &self.times);
+                let follow = || preconditioner.follow(&evaluated.point.u, self.device, &self.times);
                 timed(&self.times, |t| &mut t.assembly, follow)?;
             }
-            let solution = self.solve(&point, limits, Level::Both)?;
+            let Descent { from, solution } = self.solve(evaluated, limits, Level::Both)?;
             let decrease = solution.slope.abs();
             // No search finds a decrease below the rounding of the energy.
-            let lost = !solution.negative_curvature && decrease <= self.noise(point.energy);
+            let lost = !solution.negative_curvature && decrease <= self.noise(from.energy);
             let done = self.converged(motion, solution.slope);
             self.info.newton += 1;
             if let Some(exit) = done.or(lost.then_some(Exit::Precision)) {
-                return Ok((exit, self.last_step(point, &solution, lost)?));
+                return Ok((exit, self.last_step(from, &solution, lost)?));
             }
             // Sizes that a step of this length cannot hold: a shorter one is tried instead.
             let outlook = Outlook {
-                energy: point.energy,
+                energy: from.energy,
                 slope: decrease,
             };
             if self.held.is_some()
-                && !self.is_rounding(decrease, point.energy)
+                && !self.is_rounding(decrease, from.energy)
                 && progress.has_stalled(self.info.estimate, self.params.tolerance, outlook)
             {
-                break;
+                return Ok((Exit::IterationLimit, (from.u, from.energy)));
             }
-            point = match self.along_the_profile(&point, &solution)? {
+            evaluated = match self.along_the_profile(&from, &solution)? {
                 Some(next) => next,
-                None => match self.straight(&point, &solution, STRAIGHT, 1e-4)? {
-                    Some((place, _)) => self.point(place)?,
+                None => match self.straight(&from, &solution, STRAIGHT, 1e-4)? {
+                    Some((place, _)) => self.evaluate(place)?,
                     None => {
-                        let exit = self.stuck(decrease, point.energy);
-                        return Ok((exit, (point.u, point.energy)));
+                        let exit = self.stuck(decrease, from.energy);
+                        return Ok((exit, (from.u, from.energy)));
                     }
                 },
             };
         }
-        Ok((Exit::IterationLimit, (point.u, point.energy)))
+        let Point { u, energy, .. } = evaluated.point;
+        Ok((Exit::IterationLimit, (u, energy)))
     }
 
     /// The start with a clean profile, or the previous phase field if the energy is lower there.
-    fn better_start(&mut self, start: &Tensor<D>) -> Result<Point<D>, Error> {
+    fn better_start(&mut self, start: &Tensor<D>) -> Result<Evaluated<D>, Error> {
         let place = match self.place(self.keep_outside(start.clone()))? {
             Some(place) => place,
             None => self.found(self.previous, false)?,
         };
-        let point = self.point(place)?;
-        if !point.energy.is_finite() {
+        let evaluated = self.evaluate(place)?;
+        if !evaluated.point.energy.is_finite() {
             return Err(Error::non_finite(0, "energy of the start"));
         }
-        let point = self.clean(point)?;
-        if point.energy <= self.info.energy_before {
-            return Ok(point);
+        let cleaned = self.clean(evaluated)?;
+        if cleaned.point.energy <= self.info.energy_before {
+            return Ok(cleaned);
         }
+        let point = cleaned.point;
         // Where a target moves, so does the energy of standing still.
-        let previous = self.point(self.found(self.previous, false)?)?;
-        if previous.energy < point.energy {
+        let previous = self.evaluate(self.found(self.previous, false)?)?;
+        if previous.point.energy < point.energy {
             return Ok(previous);
         }
-        // The objective's own point is the previous one by now.
-        let Point { u, tangent, .. } = point;
-        self.point(Place { u, tangent })
+        self.return_to(point)
     }
 
     /// The result of the whole last Newton step, or the point before it if the step raises the energy. A rise by rounding does not count where the expected
@@ -532,7 +548,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         &mut self,
         point: &Point<D>,
         solution: &CgSolution<D>,
-    ) -> Result<Option<Point<D>>, Error> {
+    ) -> Result<Option<Evaluated<D>>, Error> {
         const HOPELESS: f64 = 50.0;
         const SHORTEST: f64 = 0.02;
         let (sign, decrease) = (-solution.slope.signum(), solution.slope.abs());
@@ -540,11 +556,11 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         while t >= SHORTEST {
             let u = retract(&point.u, &solution.direction, sign * t);
             let trial = self.trial(self.keep_outside(u))?;
-            if let Some(trial) = trial.filter(|trial| trial.energy < HOPELESS * point.energy.abs())
-            {
-                let trial = self.clean(trial)?;
-                if trial.energy <= point.energy - 1e-3 * t * decrease {
-                    return Ok(Some(trial));
+            let hopeless = HOPELESS * point.energy.abs();
+            if let Some(trial) = trial.filter(|trial| trial.point.energy < hopeless) {
+                let cleaned = self.clean(trial)?;
+                if cleaned.point.energy <= point.energy - 1e-3 * t * decrease {
+                    return Ok(Some(cleaned));
                 }
             }
             t *= 0.4;
@@ -568,29 +584,34 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
 
     /// The method of the paper: from `u_k`, conjugate gradients with a forcing sequence, Armijo backtracking on a straight line.
     fn paper(&mut self) -> Result<End<D>, Error> {
-        let mut point = self.point(self.found(self.previous, false)?)?;
-        let first = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
+        let mut evaluated = self.evaluate(self.found(self.previous, false)?)?;
+        let first = self.norm(&evaluated.gradient)?;
         while self.info.newton < self.params.newton_iterations {
-            let norm = dot(&point.gradient, &point.gradient, self.device)?.sqrt();
+            let norm = self.norm(&evaluated.gradient)?;
             let forcing = (norm / first.max(f64::MIN_POSITIVE)).sqrt().min(0.5);
             let limits = CgLimits {
                 tolerance: forcing.min(self.params.cg_tolerance),
                 least: 0.0,
                 iterations: self.params.cg_iterations,
             };
-            let solution = self.solve(&point, limits, Level::Both)?;
-            let done = self.converged(self.motion(&point)?, solution.slope);
+            let Descent { from, solution } = self.solve(evaluated, limits, Level::Both)?;
+            let done = self.converged(self.motion(&from)?, solution.slope);
             self.info.newton += 1;
-            let next = self.straight(&point, &solution, STRAIGHT, 1e-4)?;
-            point = match (done, next) {
-                (None, Some((place, _))) => self.point(place)?,
+            let next = self.straight(&from, &solution, STRAIGHT, 1e-4)?;
+            evaluated = match (done, next) {
+                (None, Some((place, _))) => self.evaluate(place)?,
                 (Some(exit), Some((place, energy))) => return Ok((exit, (place.u, energy))),
                 (done, None) => {
-                    let stuck = self.stuck(solution.slope.abs(), point.energy);
-                    return Ok((done.unwrap_or(stuck), (point.u, point.energy)));
+                    let stuck = self.stuck(solution.slope.abs(), from.energy);
+                    return Ok((done.unwrap_or(stuck), (from.u, from.energy)));
                 }
             };
         }
-        Ok((Exit::IterationLimit, (point.u, point.energy)))
+        let Point { u, energy, .. } = evaluated.point;
+        Ok((Exit::IterationLimit, (u, energy)))
+    }
+
+    fn norm(&self, vector: &Tensor<D>) -> Result<f64, Error> {
+        Ok(dot(vector, vector, self.device)?.sqrt())
     }
 }

@@ -220,12 +220,9 @@ fn program(options: &Options) -> Result<()> {
     let turns = if quick { 0.05 } else { options.turns };
     let parameters = json!({ "turns": turns, "threads": rayon::current_num_threads(), "storages": options.storage.about(run)? });
     let mut session = Session::open(EXPERIMENT.name, run, parameters)?;
-    let on_cpu = session.device.kind().is_cpu();
-    require(on_cpu || !options.shares, "--shares needs a CPU")?;
-    if on_cpu {
-        shares::measure(&mut session, &options.storage)?;
-    }
     if options.shares {
+        require(session.device.kind().is_cpu(), "--shares needs a CPU")?;
+        shares::measure(&mut session, &options.storage)?;
         return session.finish("Where the time goes");
     }
     let mut all = Vec::new();
