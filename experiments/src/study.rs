@@ -32,8 +32,8 @@ pub struct StudyOptions {
     #[arg(long = "scheme", value_name = "NAME", value_enum)]
     pub formulation: Option<Formulation>,
 
-    /// Leave out all whose name FLOW.nN.METHOD, as in summaries, begins like this, such as willmore.n1024 or mcf.n1024.fe;
-    /// separated by commas
+    /// Leave out what has a name FLOW.nN.METHOD that begins like one of these, such as willmore.n1024 or mcf.n1024.fe, with the
+    /// methods of results/METRICS.md; separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub without: Vec<String>,
 }
