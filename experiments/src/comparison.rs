@@ -169,7 +169,7 @@ fn compare(setting: &Setting, options: &Options) -> Result<()> {
     // Franken, Rumpf and Wirth: for eps = 2h the nested scheme is unstable.
     let nested = |method: Method| flow == Flow::Willmore && !method.is_learned();
     let stable = |method, n| !nested(method) || n as f64 * EPS >= 4.0;
-    let variants = options.study.variants(flow, stable)?;
+    let variants = options.study.left(options.study.variants(flow, stable))?;
     let study = Study::new(&options.study.networks, &variants)?;
     let message = "no method is left: choose other --methods, --scheme, --cells or --without";
     require(!study.plan.is_empty(), message)?;

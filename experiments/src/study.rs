@@ -48,17 +48,8 @@ impl StudyOptions {
         })
     }
 
-    /// The chosen methods in their formulations at all resolutions but for those that are left out; without a choice of methods
-    /// those that are `usual` at a resolution.
-    ///
-    /// # Errors
-    ///
-    /// A name of this flow leaves nothing out.
-    pub fn variants(
-        &self,
-        flow: Flow,
-        usual: impl Fn(Method, usize) -> bool,
-    ) -> Result<Vec<Variant>> {
+    /// The chosen methods in their formulations at all resolutions; without a choice those that are `usual` at a resolution.
+    pub fn variants(&self, flow: Flow, usual: impl Fn(Method, usize) -> bool) -> Vec<Variant> {
         let chosen = |method: Method, n: usize| match &self.methods[..] {
             [] => usual(method, n),
             methods => methods.contains(&method),
@@ -71,13 +62,17 @@ impl StudyOptions {
                 variants.extend(cells.map(|n| Variant::new(flow, discretization, n)));
             }
         }
-        let of_another = |name: &str| {
-            let mut others = Flow::ALL.into_iter().filter(|other| *other != flow);
-            others.any(|other| name.starts_with(&other.to_string()))
-        };
-        for name in self.without.iter().filter(|name| !of_another(name)) {
+        variants
+    }
+
+    /// All variants of a study but for those of `--without`.
+    ///
+    /// # Errors
+    /// A name that leaves nothing out.
+    pub fn left(&self, mut variants: Vec<Variant>) -> Result<Vec<Variant>> {
+        for name in &self.without {
             let all = variants.len();
-            variants.retain(|variant| !format!("{flow}.{}", variant.key()).starts_with(name));
+            variants.retain(|v| !format!("{}.{}", v.flow, v.key()).starts_with(name));
             require(
                 variants.len() < all,
                 format!("--without {name} leaves nothing out"),

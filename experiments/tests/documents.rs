@@ -144,7 +144,7 @@ fn every_metric_is_explained_and_every_explanation_is_of_a_metric() {
     }
 }
 
-/// Of results that are made anew, `paper_numbers` is made after them.
+/// Whoever makes results anew runs `paper_numbers` again after that.
 #[test]
 fn the_numbers_beside_those_of_the_paper_are_those_of_the_summaries() {
     let summaries = summaries();

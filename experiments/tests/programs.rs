@@ -129,6 +129,9 @@ fn resolutions_names_and_outputs_that_cannot_be() {
         let without = ["--quick", "--without", name];
         refused(CIRCLES, root.path(), &without, &[name, "nothing"]);
     }
+    // The cross has no variants of the other flow.
+    let without = ["--quick", "--without", "mcf.n128"];
+    refused("cross", root.path(), &without, &["mcf.n128", "nothing"]);
     refused(TRAIN, root.path(), &["--only", "n2048"], &["n2048", "n128"]);
     for program in [CROSS, MCF_CROSS, RECTANGLE] {
         refused(

@@ -146,7 +146,6 @@ impl OpenSurface {
         all
     }
 
-    /// The surface alone.
     /// The noise of the surface without its lids. Creases at its boundary are none.
     fn noise(&self, mesh: &TriangleMesh) -> NoiseEstimate {
         if self.creases.is_empty() {
@@ -155,6 +154,7 @@ impl OpenSurface {
         self.without_lids(mesh).noise()
     }
 
+    /// The surface alone.
     fn without_lids(&self, mesh: &TriangleMesh) -> TriangleMesh {
         TriangleMesh {
             vertices: mesh.vertices[..self.vertices].to_vec(),

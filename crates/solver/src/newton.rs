@@ -287,7 +287,7 @@ impl<const D: usize, O: Objective<D>> Minimizer<'_, '_, D, O> {
         })
     }
 
-    /// A point again, after others.
+    /// A point again: the objective's own point is another by now.
     fn return_to(&mut self, Point { u, tangent, .. }: Point<D>) -> Result<Evaluated<D>, Error> {
         self.evaluate(Place { u, tangent })
     }

@@ -187,10 +187,7 @@ impl Fairing {
     /// The longest time of Willmore flow for the noise, on a grid of this spacing, all lengths multiplied by `scale`.
     pub fn time(&self, spacing: f64, scale: f64) -> f64 {
         let edge = scale * self.rough.mesh().mean_edge();
-        let find = || {
-            let estimate = self.rough.mesh().noise_of_first(self.surface());
-            estimate.deviation
-        };
+        let find = || self.rough.mesh().deviation_of_first(self.surface());
         let found = *self.found.get_or_init(find);
         let is_beyond = self.noise > BEYOND * found;
         let most = if is_beyond { TIME_BEYOND } else { TIME };

@@ -273,6 +273,7 @@ pub(crate) fn angle_weighted_normals(vertices: &[Vector], faces: &[[u32; 3]]) ->
     let at_corners = |face: &[u32; 3]| {
         let triangle = face.map(|v| vertices[v as usize]);
         let normal = scaled_normal(triangle).normalize_or_zero();
+        // The angles of a triangle add up to pi, which saves an arc tangent.
         let [first, second] = [0, 1].map(|corner| angle(&triangle, corner));
         [first, second, PI - first - second].map(|angle| normal * angle)
     };

@@ -19,7 +19,7 @@ const IN_ROW: usize = 1 << 16;
 /// An estimate of the noise of a mesh by its vertices alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseEstimate {
-    /// The standard deviation of the vertices along their normals, as far as it is independent from vertex to vertex.
+    /// The standard deviation of the vertices along their normals, in the units of the mesh, as far as it is independent from vertex to vertex.
     ///
     /// It is the root of the median over the vertices of means over their neighbours of `(n . L L x)^2`, each divided by the sum of the
     /// squares of its coefficients: twice the Laplacian `L` takes away what varies slowly, the mean is the variance whatever the
@@ -49,6 +49,20 @@ impl TriangleMesh {
     pub fn noise_of_first(&self, count: usize) -> NoiseEstimate {
         Differences::of(self, count).estimate()
     }
+
+    /// [`NoiseEstimate::deviation`] alone.
+    pub(crate) fn deviation_of_first(&self, count: usize) -> f64 {
+        let differences = Differences::of(self, count);
+        let squares = differences.squares(&differences.smooth_normals());
+        differences.deviation(&squares)
+    }
+}
+
+/// `(n . L L x)^2` at each vertex with the normal `n`, divided by the sum of the squares of its coefficients, and its mean over neighbours.
+struct Squares {
+    /// None where there are too few neighbours.
+    own: Vec<Option<f64>>,
+    means: Vec<f64>,
 }
 
 /// What Laplacians leave of the first vertices of a mesh.
@@ -77,22 +91,34 @@ impl<'a> Differences<'a> {
     }
 
     fn estimate(&self) -> NoiseEstimate {
-        // Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
-        let smooth = self.mesh.smoothed_by(&self.umbrellas, 12, TAUBIN);
-        let normals = smooth.vertex_normals();
-        let squares = self.squares_of_twice(&normals);
-        let means = self.averaged(squares.iter().map(|square| square.unwrap_or(0.0)));
-        let inner = means.iter().zip(&squares).take(self.count);
-        let inner = inner.filter(|(_, square)| square.is_some());
-        let deviation = median(inner.map(|(mean, _)| *mean)).sqrt() / MEDIAN_OF_MEANS;
+        let normals = self.smooth_normals();
+        let squares = self.squares(&normals);
+        let deviation = self.deviation(&squares);
         NoiseEstimate {
             deviation,
-            is_shape: self.is_shape(&normals, &means, deviation),
+            is_shape: self.is_shape(&normals, &squares.means, deviation),
             flat_part: self.flat_part(deviation),
         }
     }
 
-    /// `(n . L L x)^2` at each vertex with the normal `n`, divided by the sum of the squares of its coefficients.
+    /// Normals of the smoothed mesh: noise turns those of the mesh itself, towards the plane of their neighbours.
+    fn smooth_normals(&self) -> Vec<[f64; 3]> {
+        let smooth = self.mesh.smoothed_by(&self.umbrellas, 12, TAUBIN);
+        smooth.vertex_normals()
+    }
+
+    fn squares(&self, normals: &[[f64; 3]]) -> Squares {
+        let own = self.squares_of_twice(normals);
+        let means = self.averaged(own.iter().map(|square| square.unwrap_or(0.0)));
+        Squares { own, means }
+    }
+
+    fn deviation(&self, Squares { own, means }: &Squares) -> f64 {
+        let of_surface = means.iter().zip(own).take(self.count);
+        let inner = of_surface.filter(|(_, square)| square.is_some());
+        median(inner.map(|(mean, _)| *mean)).sqrt() / MEDIAN_OF_MEANS
+    }
+
     fn squares_of_twice(&self, normals: &[[f64; 3]]) -> Vec<Option<f64>> {
         let rows = self.twice.iter().zip(normals).zip(&self.weights);
         rows.map(|((way, normal), weight)| {

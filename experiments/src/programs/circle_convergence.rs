@@ -123,9 +123,9 @@ fn program(options: &Options) -> Result<()> {
     require((1..=most).contains(&count), message)?;
     // Nested finite elements take hours; everything else together some minutes.
     let usual = |method: Method, _| method.is_learned() || options.study.full;
-    let willmore = options.study.variants(Flow::Willmore, usual)?;
-    let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true)?;
-    let variants = [mean_curvature, willmore].concat();
+    let willmore = options.study.variants(Flow::Willmore, usual);
+    let mean_curvature = options.study.variants(Flow::MeanCurvature, |_, _| true);
+    let variants = options.study.left([mean_curvature, willmore].concat())?;
     let study = Study::new(&options.study.networks, &variants)?;
     let has = |flow| study.variants().any(|variant| variant.flow == flow);
     let message =
