@@ -1,5 +1,7 @@
 //! The extension module of the Python package `willmore`: arrays in, arrays out. What people call is written in Python, in `willmore/`.
 
+#![expect(clippy::needless_pass_by_value, reason = "PyO3 hands arguments over")]
+
 mod error;
 mod exact;
 mod input;
