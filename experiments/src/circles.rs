@@ -128,9 +128,16 @@ impl Ensemble {
         self.circles.iter().map(move |circle| circle.error(k))
     }
 
+    pub fn seconds(&self) -> f64 {
+        self.mean(|circle| circle.trajectory.seconds())
+    }
+
+    fn steps(&self) -> usize {
+        self.circles[0].trajectory.records.len()
+    }
+
     pub fn seconds_per_step(&self) -> f64 {
-        let steps = self.circles[0].trajectory.records.len();
-        self.mean(|circle| circle.trajectory.seconds()) / steps as f64
+        self.seconds() / self.steps() as f64
     }
 
     pub fn minimizations(&self) -> impl Iterator<Item = &StepRecord> {
@@ -141,6 +148,50 @@ impl Ensemble {
     /// A number summed over all minimizations; nothing for mean curvature flow.
     pub fn total(&self, of: impl Fn(&StepRecord) -> usize) -> Option<usize> {
         self.minimizations().map(of).reduce(|a, b| a + b)
+    }
+
+    pub fn averages(&self) -> Averages {
+        let steps = self.steps();
+        let count = |k: usize, of: fn(&StepRecord) -> f64| {
+            self.mean(|circle| {
+                let made = &circle.trajectory.records[k].minimization;
+                made.as_ref().map_or(0.0, of)
+            })
+        };
+        let work = |k| {
+            [
+                count(k, StepRecord::hvp),
+                count(k, |r| r.newton.newton as f64),
+            ]
+        };
+        let ends = self.circles.iter();
+        Averages {
+            variant: self.variant,
+            errors: (0..=steps).map(|k| self.mean_error(k)).collect(),
+            ends: ends.map(|c| [c.radius, c.error(steps)]).collect(),
+            work: (0..steps).map(work).collect(),
+            seconds: self.seconds(),
+        }
+    }
+}
+
+/// Means over all circles of one variant.
+pub struct Averages {
+    pub variant: Variant,
+    /// `L2` error after no, one, ... steps.
+    pub errors: Vec<f64>,
+    /// Of each circle, the radius and the error at the end.
+    pub ends: Vec<[f64; 2]>,
+    /// Of each step, Hessian-vector products and Newton steps.
+    pub work: Vec<[f64; 2]>,
+    /// Wall time of all steps of a circle.
+    pub seconds: f64,
+}
+
+impl Averages {
+    /// At the end.
+    pub fn error(&self) -> f64 {
+        self.errors[self.errors.len() - 1]
     }
 }
 

@@ -15,6 +15,7 @@
 #![expect(clippy::missing_errors_doc, reason = "said once for all of them")]
 #![allow(missing_docs, reason = "of fields whose names say it")]
 
+pub mod circle_figures;
 pub mod circles;
 pub mod comparison;
 pub mod derived;

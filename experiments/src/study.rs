@@ -175,13 +175,8 @@ impl Study {
     }
 
     fn dashes(&self, n: usize) -> LineStyle {
-        use LineStyle::{Dashed, Dotted, ShortDashed, Solid};
-        [Solid, Dashed, ShortDashed, Dotted][self.rank(n).min(3)]
-    }
-
-    pub fn marker(&self, n: usize) -> Marker {
-        use Marker::{Circle, Diamond, Square, Triangle};
-        [Circle, Square, Triangle, Diamond][self.rank(n).min(3)]
+        use LineStyle::{DashDotDot, Dashed, Dotted, ShortDashed, Solid};
+        [Solid, Dashed, ShortDashed, Dotted, DashDotDot][self.rank(n).min(4)]
     }
 
     /// The curve of a variant: colours stand for discretizations, dashes for resolutions. Such curves often coincide, so coarser

@@ -1,4 +1,5 @@
-use crate::circles::{self, Circle, Ensemble};
+use crate::circle_figures::Drawing;
+use crate::circles::{self, Ensemble};
 use crate::prelude::*;
 use crate::session::remove_folder;
 
@@ -16,7 +17,11 @@ pub const EXPERIMENT: Experiment = Experiment {
             figures: &[
                 (
                     "convergence",
-                    "Mean L² error over the circles against time, mean curvature flow and Willmore flow.",
+                    "Mean L² error over the circles at the end against the resolution, mean curvature flow and Willmore flow.",
+                ),
+                (
+                    "error_over_time",
+                    "Mean L² error over the circles against time, by resolutions.",
                 ),
                 (
                     "error_over_radius",
@@ -25,10 +30,6 @@ pub const EXPERIMENT: Experiment = Experiment {
                 (
                     "work_per_step",
                     "Hessian-vector products and Newton steps for each step of Willmore flow, mean over the circles.",
-                ),
-                (
-                    "error_over_cost",
-                    "Error of Willmore flow at the end against the time that a circle takes.",
                 ),
             ],
             options: Some(
@@ -56,7 +57,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const METRICS: MetricTable = MetricTable {
     title: "Circles",
-    note: "",
+    note: "The run of `circle_convergence` was paused at times and shared the machine with other work. Compare the times of `circle_cost`.",
     words: &[
         METHOD,
         (
@@ -144,12 +145,10 @@ fn program(options: &Options) -> Result<()> {
             Ensemble::run(planned, count, steps, FINISHED, stage)
         })?);
     }
-    let report = Report {
-        study,
-        ensembles,
-        steps,
-    };
-    report.figures(&session)?;
+    let report = Report { ensembles, steps };
+    for (name, figure) in report.drawing().figures() {
+        session.figure(figure, name)?;
+    }
     report.data(&session)?;
     session.sheet(report.sheet(), "errors")?;
     for flow in Flow::ALL {
@@ -160,7 +159,6 @@ fn program(options: &Options) -> Result<()> {
 }
 
 struct Report {
-    study: Study,
     ensembles: Vec<Ensemble>,
     steps: usize,
 }
@@ -179,100 +177,13 @@ impl Report {
         (self.of_flow(flow).last()).map(|e| e.mean(|circle| circle.travelled))
     }
 
-    /// A chart for each flow with a curve for each variant.
-    fn flows(&self, x: &str, y: &str, curve: impl Fn(&Ensemble) -> Series) -> [LineChart; 2] {
-        Flow::ALL.map(|flow| {
-            let chart = LineChart::new(flow.title(), Axis::linear(x), Axis::log(y));
-            self.study.chart(chart, self.of_flow(flow).map(&curve))
-        })
-    }
-
-    fn figures(&self, session: &Session) -> Result<()> {
-        let (steps, end) = (self.steps, time(self.steps));
-        let mut over_time = self.flows("time t", "mean L² error", |e| {
-            let points = (0..=steps).map(|k| [time(k), e.mean_error(k)]);
-            self.study.series(e.variant, points.collect())
-        });
-        for (chart, flow) in over_time.iter_mut().zip(Flow::ALL) {
-            if let Some(scale) = self.scale(flow) {
-                chart.note = format!("For scale: mean ‖u(t) − u(0)‖ = {scale:.3} at t = {end:.4}.");
-            }
+    fn drawing(&self) -> Drawing {
+        let scales = Flow::ALL.into_iter();
+        let scales = scales.filter_map(|flow| Some((flow, self.scale(flow)?)));
+        Drawing {
+            averages: self.ensembles.iter().map(Ensemble::averages).collect(),
+            scales: scales.collect(),
         }
-        let over_radius = self.flows("initial radius r", "L² error", |e| {
-            let points = e.circles.iter().map(|c| [c.radius, c.error(steps)]);
-            let curve = self.study.series(e.variant, points.collect());
-            let marker = self.study.marker(e.variant.n);
-            curve.with_marker(marker).with_width(1.6)
-        });
-        let circles = &self.ensembles[0].circles;
-        let (count, last) = (circles.len(), circles[circles.len() - 1].radius);
-        let figure = Figure::new("Error on circles over time", 2)
-            .with_panels(over_time)
-            .with_shared_legend()
-            .with_note(format!(
-                "ε = 2⁻⁶, τ = 2⁻¹⁴, h = 1/n; mean over {count} circles with radii between {:.3} and {last:.3}.",
-                circles[0].radius
-            ));
-        session.figure(figure, "convergence")?;
-        let title = format!("Error on circles at t = {end:.4} over the radius");
-        let figure = Figure::new(title, 2).with_panels(over_radius);
-        session.figure(figure.with_shared_legend(), "error_over_radius")?;
-        let title = "Work per step of Willmore flow, mean over the circles";
-        let figure = Figure::new(title, 2).with_panels(self.work());
-        session.figure(figure.with_shared_legend(), "work_per_step")?;
-        session.figure(self.cost(), "error_over_cost")
-    }
-
-    fn work(&self) -> [LineChart; 2] {
-        let counts: [(&str, fn(&StepRecord) -> f64); 2] = [
-            ("Hessian-vector products", StepRecord::hvp),
-            ("Newton steps", |r| r.newton.newton as f64),
-        ];
-        counts.map(|(label, count)| {
-            let mut highest = 1.0_f64;
-            let mut curves = Vec::new();
-            for e in self.of_flow(Flow::Willmore) {
-                let of = |circle: &Circle, k: usize| {
-                    let made = &circle.trajectory.records[k].minimization;
-                    made.as_ref().map_or(0.0, count)
-                };
-                let point = |k| [time(k + 1), e.mean(|circle| of(circle, k))];
-                let points: Vec<[f64; 2]> = (0..self.steps).map(point).collect();
-                highest = points.iter().map(|point| point[1]).fold(highest, f64::max);
-                curves.push(self.study.series(e.variant, points).with_width(1.8));
-            }
-            let y = Axis::linear(label).with_range(0.0, 1.1 * highest);
-            let chart = LineChart::new("", Axis::linear("time t"), y);
-            self.study.chart(chart, curves)
-        })
-    }
-
-    /// Error at the end over the mean wall time of a circle, a curve for each discretization.
-    fn cost(&self) -> Figure {
-        let steps = self.steps;
-        let own = |discretization| {
-            let ensembles = self.of_flow(Flow::Willmore);
-            ensembles.filter(move |e| e.variant.discretization == discretization)
-        };
-        let shown = study::discretizations().filter(|&one| own(one).next().is_some());
-        let curves = shown.map(|discretization| {
-            let cells = own(discretization).map(|e| e.variant.n.to_string());
-            let cells: Vec<String> = cells.collect();
-            let name = format!("{}, n = {}", discretization.label(), cells.join(", "));
-            let point = |e: &Ensemble| [e.seconds_per_step() * steps as f64, e.mean_error(steps)];
-            Series::of(name, own(discretization), point)
-                .with_colour(study::colour(discretization))
-                .with_marker(Marker::Circle)
-        });
-        let error = Axis::log(format!("mean L² error at t = {:.4}", time(steps)));
-        let chart = LineChart::new("", Axis::log("wall time per circle [s]"), error);
-        Figure::new("Willmore flow of circles: accuracy against cost", 1)
-            .with_panel(chart.with_curves(curves))
-            .with_shared_legend()
-            .with_note(format!(
-                "{steps} time steps; mean over {} circles, each on one core.",
-                self.ensembles[0].circles.len()
-            ))
     }
 
     fn data(&self, session: &Session) -> Result<()> {
