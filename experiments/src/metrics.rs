@@ -28,7 +28,7 @@ pub const NUMBERS: [Word; 2] = [
     ),
     (
         "K",
-        "a number: so many time steps have been made; 0 is the initial shape",
+        "a number of the usual time steps: so many have been made, or so much time has passed; 0 is the initial shape",
     ),
 ];
 
@@ -156,32 +156,52 @@ pub fn values(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
 
-/// The tables of `results/METRICS.md`, from the one of the words on.
-pub fn page(experiments: &[&Experiment]) -> String {
-    // Parts of the meanings: of a word that experiments use for different things, each adds its own.
-    let mut known: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (word, meaning) in experiments.iter().flat_map(|experiment| words(experiment)) {
-        let parts = meaning.split(", ");
-        match known.iter_mut().find(|(other, _)| *other == word) {
-            Some((_, known)) => {
-                for part in parts {
-                    if !known.contains(&part) {
-                        known.push(part);
-                    }
-                }
-            }
-            None => known.push((word, parts.collect())),
+/// What each word means in which experiments, in the order in which they use it.
+fn meanings<'a>(experiments: &[&'a Experiment]) -> Vec<(&'a str, Vec<(&'a str, Vec<&'a str>)>)> {
+    let mut known: Vec<(&str, Vec<(&str, Vec<&str>)>)> = Vec::new();
+    for experiment in experiments {
+        for (word, meaning) in words(experiment) {
+            let of_word = entry(&mut known, word);
+            entry(of_word, meaning).push(experiment.name);
         }
     }
-    let known = known.into_iter();
-    let words = known.map(|(word, parts)| format!("| `{word}` | {} |", parts.join(", ")));
+    known
+}
+
+fn entry<'a, 'k, V: Default>(known: &'k mut Vec<(&'a str, V)>, key: &'a str) -> &'k mut V {
+    let found = known.iter().position(|(other, _)| *other == key);
+    let index = found.unwrap_or_else(|| {
+        known.push((key, V::default()));
+        known.len() - 1
+    });
+    &mut known[index].1
+}
+
+fn code(names: &[&str]) -> String {
+    let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    names.join(", ")
+}
+
+/// The tables of `results/METRICS.md`, from the one of the words on.
+pub fn page(experiments: &[&Experiment]) -> String {
+    let known = meanings(experiments);
+    let words = known.iter().map(|(word, meanings)| {
+        let meaning = match &meanings[..] {
+            [(meaning, _)] => (*meaning).to_owned(),
+            several => {
+                let each = several.iter();
+                let each = each.map(|(meaning, where_)| format!("in {}: {meaning}", code(where_)));
+                each.collect::<Vec<_>>().join("; ")
+            }
+        };
+        format!("| `{word}` | {meaning} |")
+    });
     let mut lines = vec!["| in names | stands for |".into(), "|---|---|".to_owned()];
     lines.extend(words);
     let everywhere = (&ALL, Vec::new());
     for (table, folders) in [everywhere].into_iter().chain(tables(experiments)) {
-        let folders: Vec<_> = folders.iter().map(|name| format!("`{name}`")).collect();
         let colon = if folders.is_empty() { "" } else { ": " };
-        let title = format!("## {}{colon}{}", table.title, folders.join(", "));
+        let title = format!("## {}{colon}{}", table.title, code(&folders));
         lines.extend([String::new(), title, String::new()]);
         if !table.note.is_empty() {
             lines.extend([table.note.to_owned(), String::new()]);

@@ -61,13 +61,15 @@ pub enum Command {
     Info,
     /// Check the computation of a time step on your own input
     ///
-    /// Taylor tests check the gradient and the Hessian of the energy of a time step. The Hessian must be symmetric. If the program contains a CPU
+    /// Taylor tests check the gradient and the Hessian of the energy of a time step, with the network of the scheme and without its calibration. The Hessian must be symmetric. If the program contains a CPU
     /// backend that is not the chosen device, it also compares the gradients that the two compute.
     #[command(after_help = "Examples:
   willmore check logo.png
   willmore check builtin:torus --device wgpu")]
     Check(Configured<CheckOptions>),
-    /// Train a network for a kernel width, an interface width or a time step that no network of the program has
+    /// Train a network for a kernel width or an interface width that no network of the program has
+    ///
+    /// Networks are trained on a CPU.
     #[command(after_help = "Example:
   willmore train --dimension 2 --width 25 --eps-over-h 3 --step-over-h2 2.25 --save mine.safetensors
   willmore flow logo.png --network mine.safetensors")]
@@ -158,7 +160,7 @@ pub struct MessageOptions {
 
     /// Print the outcome as JSON
     ///
-    /// The outcome is one object. With --label all there is one object for each label. The command `networks` prints an array.
+    /// The outcome is one object. With --label all there is one object for each label, but one for all with --shared. The list of `networks` is an array.
     #[arg(long, global = true, help_heading = "Output")]
     pub json: bool,
 }

@@ -7,7 +7,7 @@ use crate::profile::Profile;
 
 /// Times of the heat kernels over `sqrt(tau / STRENGTH)`: near each other, so that the kernel is narrow.
 const TIMES: [f64; 4] = [0.75, 0.9, 1.08, 1.3];
-/// With it the multipliers of waves are in (-0.89, 1]; with more than 0.89 steps are unstable.
+/// With it the multipliers of waves are in (-0.89, 1]; with 0.9 steps are unstable.
 const STRENGTH: f64 = 0.83;
 
 /// A heat kernel `exp(-r^2 / 4t)` in the sum.

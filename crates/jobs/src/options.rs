@@ -28,13 +28,14 @@ pub struct InputOptions {
     /// A mesh is .obj, .stl, .ply or .off. An image is .png, .jpg, .webp, .gif, .tif or .bmp. A volume of voxels is .nii, .nii.gz, .nrrd, .nhdr, .mgh,
     /// .mgz, .mrc, .map, .tif with several pages, or .npy with labels in 3D. A field is .npy. A built-in shape is builtin:NAME, where NAME is disc,
     /// ring, cross, rectangle, sphere, cube, torus, coin, figure or lever. A region in 2D is box:x0,y0,x1,y1 or ball:x,y,r. A region in 3D is
-    /// box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is standard input.
+    /// box:x0,y0,z0,x1,y1,z1 or ball:x,y,z,r. The input - is standard input. `willmore fair` takes shapes in 3D alone.
     pub input: Option<Input>,
 
     /// Cells per unit length of the box [default: depends on the input]
     ///
-    /// By default, a mesh, an image or a volume gets the coarsest of a few grids that resolves its thin parts. A field keeps its own grid. Other
-    /// shapes get 128 cells per unit length in 2D and 64 in 3D.
+    /// By default, a mesh, an image or a volume gets the coarsest of a few grids that resolves its thin parts. For a volume, the cells are also no wider
+    /// than its voxels, if one of these grids is so fine. For `fair` of a mesh, it is the first of 128, 160 and 192 on which the parts and holes of the
+    /// mesh are the same. A field keeps its own grid. Other shapes get 128 cells per unit length in 2D and 64 in 3D.
     #[arg(long, value_name = "N", help_heading = GRID)]
     pub cells: Option<usize>,
 
@@ -63,7 +64,7 @@ pub struct InputOptions {
 
     /// Label of the voxels that are inside, or the word all [default: if there are two labels, the one with the greater value]
     ///
-    /// With all, each label except 0 becomes a surface of its own; see also `shared`.
+    /// With all, each label except 0 becomes a surface of its own. Only `willmore fair` can make them share their walls (`shared`).
     #[arg(long, value_name = "LABEL", conflicts_with = "threshold", help_heading = INPUT)]
     pub label: Option<Label>,
 
@@ -151,7 +152,7 @@ pub struct OperatorOptions {
     /// Part of the phase field that is stored: dense, bricks or auto [default: auto]
     ///
     /// dense stores the whole grid. bricks stores only blocks of cells near the surface. auto stores bricks if they are less than half of the grid,
-    /// else the whole grid. Mean curvature flow, finite elements and the paper's networks always store the whole grid.
+    /// else the whole grid. Mean curvature flow, finite elements, direct steps and the paper's networks need the whole grid.
     #[arg(
         long,
         value_name = "PART",
@@ -207,7 +208,7 @@ impl Default for CommonOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// Make at most this many steps [default: 20, or 1000 if another option says when to stop]
+    /// Make at most this many steps [default: 20, or 1000 if something else ends the run, for `mcf` 100000]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
     pub steps: Option<usize>,
 
@@ -369,9 +370,10 @@ pub struct WillmoreOptions {
     #[arg(long, value_name = "P", value_parser = finite, allow_hyphen_values = true, help_heading = SIZES, hide_short_help = true)]
     pub pressure: Option<f64>,
 
-    /// Stop when the Willmore energy is no more than W
+    /// Stop when the energy is no more than W
     ///
-    /// The energy of a sphere is 8 pi = 25.13. The energy of a circle of radius R is pi / R.
+    /// The Willmore energy of a sphere is 8 pi = 25.13. That of a circle of radius R is pi / R. Terms that are added to it, such as that of `tension`,
+    /// count, too. `willmore fair` takes no W below 30.2, since it would leave a ball.
     #[arg(long, value_name = "W", value_parser = positive, help_heading = FLOW, hide_short_help = true)]
     pub energy: Option<f64>,
 }
@@ -444,15 +446,16 @@ pub struct FairOptions {
     /// Radius below which details of a segmentation are smoothed away, in the units of the input [default: 1.25 voxels]
     ///
     /// The flow stops at the time (0.8 LENGTH)^4. A bump with the radius LENGTH / 2 keeps 12 % of its height, one with the radius LENGTH 37 %, and
-    /// one with the radius 2 LENGTH 79 %. With the default, the flow also stops when the surface has moved by 0.35 of a voxel. If `time`, `energy`,
+    /// one with the radius 2 LENGTH 79 %. (At its radius, a bump has half of its height.) With the default, the flow also stops when the surface has
+    /// moved by 0.35 of a voxel, root of the mean square. If `time`, `energy`,
     /// `energy_ratio` or `steps` says when to stop, there is no default.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub detail: Option<f64>,
 
     /// Largest distance of the vertices from the surface of the input, in its units [default: half a voxel, none for a mesh]
     ///
-    /// The surface of a segmentation is the one between its voxels. The bound wins over `noise` and `detail`: a larger detail needs a larger bound. It
-    /// also wins over a volume that is kept, where other vertices cannot make up for it. The report says how many vertices are at the bound. If `time`,
+    /// The surface of a segmentation is the one between its voxels. The bound wins over `noise` and `detail`: a larger detail needs a larger bound. If
+    /// the other vertices cannot give back the volume that vertices at the bound take, the volume changes. The report says how many vertices are at the bound. If `time`,
     /// `energy`, `energy_ratio` or `steps` says when to stop and `detail` is not given, there is no default.
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_hyphen_values = true, help_heading = FLOW)]
     pub max_distance: Option<f64>,
@@ -645,7 +648,7 @@ pub struct TrainOptions {
     #[arg(long, value_name = "RATIO")]
     pub eps_over_h: Option<f64>,
 
-    /// Time step of mean curvature flow in cells squared [default: `eps_over_h`^2 / 4; flows accept no other value]
+    /// Time step of mean curvature flow in cells squared [default: `eps_over_h`^2 / 4, which flows need]
     #[arg(long, value_name = "RATIO")]
     pub step_over_h2: Option<f64>,
 

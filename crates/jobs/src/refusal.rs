@@ -66,16 +66,16 @@ pub enum Refusal {
     /// A part of the energy that is no less than all of it.
     #[error("`energy_ratio` {0} is reached before the first step: give a part below 1")]
     EnergyRatio(f64),
-    /// An energy that only a ball has.
+    /// An energy near that of a ball.
     #[error(
-        "`energy` {0} has only a ball, which has 8 pi = 25.13, and nothing of the shape would be left: leave it out to take \
-         off the noise, or give `energy_ratio` 0.5 for half the energy that there is"
+        "`energy` {0} is too near to that of a ball, 8 pi = 25.13, so that nothing of the shape would be left: give at least 30.2, leave it out \
+         to take off the noise, or give `energy_ratio` 0.5 for half the energy that there is"
     )]
     EnergyOfBall(f64),
     /// Noise, of what is no mesh in a file.
     #[error(
         "only a mesh in a file has noise to take off: say how smooth the surface is to become, by `energy_ratio`, `time`, \
-         `energy` or `steps`, without `noise` and `keep`"
+         `energy` or `steps`, without `noise`, `edges` and `keep`"
     )]
     NoiseOfNoMesh,
     /// A mesh without noise, to be estimated.

@@ -53,7 +53,7 @@ const METRICS: MetricTable = MetricTable {
         ),
         (
             "SMOOTHER",
-            "`noisy`, the mesh with noise; `fair`, by the program; `taubin` and `laplacian`, smoothing with the best \
+            "`noisy`, the mesh with noise; `fair`, the program with `--allow-loss`; `taubin` and `laplacian`, smoothing with the best \
              number of iterations; `meshlib` and `bilateral`, MeshLib's denoiser and bilateral filtering of normals at their defaults; `meshlib_tuned` and \
              `bilateral_tuned`, with the parameters that come nearest to the clean mesh",
         ),
@@ -140,7 +140,7 @@ const SHOWN: [&str; 5] = [
 /// The methods in them.
 const SHOWN_METHODS: [&str; 5] = ["noisy", "fair", "taubin", "meshlib", "bilateral_tuned"];
 
-/// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair` at its defaults and by other methods: distances,
+/// Independent normally distributed noise along the normals of clean meshes, taken off by `willmore fair --allow-loss` and by other methods: distances,
 /// normals and volumes.
 ///
 /// Taubin's and Laplacian smoothing have the number of iterations that comes nearest to the clean mesh. MeshLib's denoiser and bilateral filtering of normals
@@ -609,7 +609,7 @@ impl Noisy<'_> {
     }
 }
 
-/// The noise taken off as `willmore fair` does at its defaults.
+/// The noise taken off as `willmore fair --allow-loss` does.
 fn faired(noisy: &Noisy, quick: bool) -> Result<TriangleMesh> {
     let mut options = FairOptions::of(Input::mesh(&noisy.clean.name, &noisy.mesh)?);
     options.input.cells = quick.then_some(QUICK_CELLS);

@@ -57,7 +57,7 @@ const METRICS: MetricTable = MetricTable {
         (
             "START.nN.STEPS.distance, START.nN.STEPS.convolutions, START.nN.STEPS.steps, START.nN.STEPS.seconds",
             "largest distance of the zero level from the exact curve at four times, convolutions of the grid, of which a Hessian-vector product counts \
-             as four, and time steps or parts of them. The grid of direct runs of the cross with N = 64 has a side of 3 in place of 2",
+             as four, and time steps or parts of them. The box of direct runs of the cross has the side 3 in place of 2, but for `direct0.004` with N = 128",
         ),
         (
             "START.nN.direct.order",

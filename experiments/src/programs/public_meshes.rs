@@ -40,7 +40,7 @@ const METRICS: MetricTable = MetricTable {
         ("faired", "how many are faired"),
         (
             "without_noise",
-            "how many are read as surfaces, in which no noise is found: `fair` does not move them unless it is told how much",
+            "how many are read as surfaces and refused since no noise is found, unless it is said how much to smooth",
         ),
         ("refused", "how many are refused for another reason"),
         (

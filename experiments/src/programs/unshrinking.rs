@@ -56,7 +56,7 @@ const METRICS: MetricTable = MetricTable {
         ),
         (
             "unshrinking.BODY.TREATMENT.area",
-            "by how much the area is larger than that of the shape, in percent: that of the staircase",
+            "difference of the area to that of the shape, in percent; that of `voxels` is the staircase's",
         ),
         (
             "unshrinking.BODY.TREATMENT.volume",

@@ -59,7 +59,7 @@ const METRICS: MetricTable = MetricTable {
         ),
         (
             "SHAPE.nN.STEPS.estimated_error.stepK",
-            "estimated time error so far, largest over the interface: local errors as delays, at the present rate; \
+            "estimated time error so far, largest over the interface: the sum of the local errors as delays, times the present speed; \
              none in the first three steps",
         ),
         (
