@@ -53,7 +53,7 @@ const METRICS: MetricTable = MetricTable {
         ),
         (
             "SMOOTHER",
-            "`noisy`, the mesh with noise; `fair`, the program with `--allow-loss`; `taubin` and `laplacian`, smoothing with the best \
+            "`noisy`, the mesh with noise; `fair`, the program with the option --allow-loss; `taubin` and `laplacian`, smoothing with the best \
              number of iterations; `meshlib` and `bilateral`, MeshLib's denoiser and bilateral filtering of normals at their defaults; `meshlib_tuned` and \
              `bilateral_tuned`, with the parameters that come nearest to the clean mesh",
         ),
