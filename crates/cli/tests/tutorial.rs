@@ -5,6 +5,7 @@
 //! - comments `<!-- quick: OPTIONS -->`: options that are put behind every command of the next block, and win over those
 //!   before them, so that the test takes seconds;
 //! - file names in `code`, which must be there in the end;
+//! - comments `<!-- value: NUMBER = FILE KEY -->`: a number that the text prints, and where the run has it;
 //! - comments `<!-- picture: docs/NAME = FILE -->`: a picture of the tutorial and the file that it is a copy of
 //!   (`scripts/regenerate_tutorial` makes the copies).
 
@@ -23,6 +24,8 @@ const EXTENSIONS: [&str; 9] = [
 struct Tutorial {
     /// With the options that make them quick.
     commands: Vec<Vec<String>>,
+    /// Numbers that the text prints, each with its file and its name there.
+    values: Vec<[String; 3]>,
     /// Files that the text names.
     files: BTreeSet<String>,
     /// Pictures with the files that they are copies of.
@@ -48,6 +51,7 @@ impl Tutorial {
         let markdown = std::fs::read_to_string(docs().join("tutorial.md")).unwrap();
         let mut tutorial = Self {
             commands: Vec::new(),
+            values: Vec::new(),
             files: BTreeSet::new(),
             pictures: Vec::new(),
             shown: BTreeSet::new(),
@@ -68,6 +72,15 @@ impl Tutorial {
             } else {
                 for options in between(line, "<!-- quick:", "-->") {
                     quick = options.split_whitespace().map(str::to_owned).collect();
+                }
+                for value in between(line, "<!-- value:", "-->") {
+                    let (number, place) = value.split_once('=').unwrap();
+                    let (file, key) = place.trim().split_once(' ').unwrap();
+                    let all = [number.trim(), file, key].map(str::to_owned);
+                    let printed = |text: &str| text.split(['|', ' ']).any(|word| word == all[0]);
+                    let lines = markdown.lines().filter(|line| !line.starts_with("<!--"));
+                    assert!(lines.into_iter().any(printed), "{number} is not printed");
+                    tutorial.values.push(all);
                 }
                 for copy in between(line, "<!-- picture:", "-->") {
                     let (picture, file) = copy.split_once('=').unwrap();
@@ -106,6 +119,13 @@ fn the_tutorial_runs_as_printed() {
         let output = program(folder.path()).args(&command[1..]).output().unwrap();
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{command:?}: {error}");
+    }
+    for [number, file, key] in &tutorial.values {
+        let found = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+        let digits = number.split_once('.').map_or(0, |(_, digits)| digits.len());
+        let found = format!("{:.digits$}", found[key].as_f64().unwrap());
+        assert_eq!(*number, found, "{key} of {file}");
     }
     let names = tutorial.pictures.iter().map(|(_, file)| file);
     for name in tutorial.files.iter().chain(names) {
