@@ -19,7 +19,7 @@ pub enum Stop {
     #[display("{}", made(*_0))]
     Steps(usize),
     /// This time is reached; the last step is cut short to end there, but for mean curvature flow, whose steps have one size.
-    #[display("the time {:e} is reached", rounded(*_0))]
+    #[display("the time {:e} is reached", solver::rounded(*_0))]
     Time(f64),
     /// The Willmore energy, as the scheme measures it, is no more than this.
     #[display("the Willmore energy is at most {_0}")]
@@ -195,9 +195,4 @@ fn made(steps: usize) -> String {
         1 => "one step is made".to_owned(),
         steps => format!("{steps} steps are made"),
     }
-}
-
-/// Of the digits of a computed time five say enough.
-fn rounded(time: f64) -> f64 {
-    format!("{time:.4e}").parse().unwrap_or(time)
 }

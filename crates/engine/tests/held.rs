@@ -103,7 +103,7 @@ fn targets_that_no_shape_has_on_the_way_are_refused() {
     let refused = Run::new(case, &device()).err().unwrap();
     let source = std::error::Error::source(&refused).map(ToString::to_string);
     assert!(
-        format!("{refused} {source:?}").contains("perimeter"),
+        format!("{refused} {source:?}").contains("length"),
         "{refused}"
     );
 }

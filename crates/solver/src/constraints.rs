@@ -52,8 +52,13 @@ const DEPENDENT: f64 = 1e-12;
 const NEAREST: f64 = 2.0;
 /// Balls that are measured are round to this part of their perimeter.
 const SLACK: f64 = 1e-4;
-/// The measures in the order of [`Sizes`].
-const NAMES: [&str; 2] = ["perimeter", "volume"];
+/// The usual names of perimeter and volume.
+pub(crate) const fn names<const D: usize>() -> [&'static str; 2] {
+    match D {
+        2 => ["length", "area"],
+        _ => ["area", "volume"],
+    }
+}
 
 /// Values at which perimeter and volume of the zero set, as [`geometry::zero_set`] measures them, are held in the following steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -97,7 +102,8 @@ impl Constraints {
     pub fn check<const D: usize>(&self, grid: &Grid<D>, eps: f64) -> Result<(), Error> {
         let smallest = ball_volume(D, eps);
         let least = [ball_perimeter(D, smallest), smallest];
-        for ((measure, target), least) in NAMES.into_iter().zip(self.targets()).zip(least) {
+        let names = names::<D>();
+        for ((measure, target), least) in names.into_iter().zip(self.targets()).zip(least) {
             if let Some(target) = target
                 && positive(measure, target)? < least
             {
@@ -112,6 +118,7 @@ impl Constraints {
         let most = grid.side().powi(D as i32) / (NEAREST * eps);
         if let Some(perimeter) = self.perimeter.filter(|perimeter| *perimeter > most) {
             return Err(Error::PerimeterTooLarge {
+                measure: names[0],
                 perimeter,
                 most,
                 eps,
@@ -122,11 +129,16 @@ impl Constraints {
         };
         let box_volume = grid.side().powi(D as i32);
         if volume >= box_volume {
-            return Err(Error::VolumeTooLarge { volume, box_volume });
+            return Err(Error::VolumeTooLarge {
+                measure: names[1],
+                volume,
+                box_volume,
+            });
         }
         match self.perimeter {
             Some(perimeter) if perimeter < (1.0 - SLACK) * least_perimeter(grid, volume) => {
                 Err(Error::PerimeterTooSmall {
+                    names,
                     perimeter,
                     volume,
                     least: least_perimeter(grid, volume),
@@ -209,7 +221,7 @@ pub(crate) struct Tangent<const D: usize> {
 /// A measure that is held, at one phase field.
 #[derive(Clone, Copy)]
 struct Part {
-    /// Its place in [`NAMES`].
+    /// Its place in [`names`].
     measure: usize,
     value: f64,
     target: f64,
@@ -322,7 +334,7 @@ impl<'a, const D: usize> Restoring<'a, D> {
         });
         Ok(Error::NotHeld {
             step: 0,
-            measure: NAMES[measure],
+            measure: names::<D>()[measure],
             value,
             target,
         })
@@ -606,7 +618,7 @@ struct Normal<const D: usize> {
 }
 
 impl<const D: usize> Projection<D> {
-    /// Onto the motions that are orthogonal to `gradients`, each with its place in [`NAMES`].
+    /// Onto the motions that are orthogonal to `gradients`, each with its place in [`names`].
     fn new(
         gradients: Vec<(usize, Tensor<D>)>,
         precondition: &dyn Fn(&Tensor<D>) -> Tensor<D>,

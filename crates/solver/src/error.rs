@@ -3,6 +3,11 @@
 use mean_curvature::StepFailure;
 use thiserror::Error as ThisError;
 
+/// A computed number with the five digits that a message needs.
+pub fn rounded(number: f64) -> f64 {
+    format!("{number:.4e}").parse().unwrap_or(number)
+}
+
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]
 pub enum Error {
@@ -36,10 +41,11 @@ pub enum Error {
         target: f64,
     },
     #[error(
-        "a perimeter of {perimeter} cannot enclose a volume of {volume}: the reduced volume would be {reduced_volume}, above 1; the perimeter \
-         has to be at least {least}"
+        "the {} {} cannot enclose the {} {}: the reduced volume would be {reduced_volume:.4}, above 1; the {} has to be at least {}",
+        .names[0], rounded(*.perimeter), .names[1], rounded(*.volume), .names[0], rounded(*.least)
     )]
     PerimeterTooSmall {
+        names: [&'static str; 2],
         perimeter: f64,
         volume: f64,
         least: f64,
@@ -50,13 +56,18 @@ pub enum Error {
     )]
     ReducedVolume { target: f64, present: f64 },
     #[error(
-        "no shape in the box with the volume {volume:.5e} has less surface than {perimeter:.5e}, so that nothing could move (in the plane, length and \
-         area): hold one of the two sizes, or more surface for this volume (a smaller reduced volume)"
+        "no shape in the box with the {1} {2} has a smaller {0} than {3}, so that nothing could move: hold one of the two sizes, or a larger {0} with \
+         this {1} (a smaller reduced volume)",
+        .names[0], .names[1], rounded(*.volume), rounded(*.perimeter)
     )]
-    LeastPerimeter { perimeter: f64, volume: f64 },
+    LeastPerimeter {
+        names: [&'static str; 2],
+        perimeter: f64,
+        volume: f64,
+    },
     #[error(
-        "a {measure} of {target} is too small to hold: an interface of width {eps} needs a ball of this radius at least, and so {least}; give at \
-         least that, or more cells"
+        "the {measure} {} is too small to hold: a ball with the width {} of the interface as its radius has {}; give at least that, or more cells",
+        rounded(*.target), rounded(*.eps), rounded(*.least)
     )]
     SizeTooSmall {
         measure: &'static str,
@@ -65,12 +76,22 @@ pub enum Error {
         eps: f64,
     },
     #[error(
-        "a perimeter of {perimeter} does not fit the box: interfaces of width {eps} are at least two widths apart, which leaves room for {most}; \
-         give less than that, or more cells"
+        "the {measure} {} does not fit the box: interfaces of width {} are at least two widths apart, which leaves room for {}; give less than that, or \
+         more cells",
+        rounded(*.perimeter), rounded(*.eps), rounded(*.most)
     )]
-    PerimeterTooLarge { perimeter: f64, most: f64, eps: f64 },
-    #[error("a volume of {volume} does not fit a box of volume {box_volume}")]
-    VolumeTooLarge { volume: f64, box_volume: f64 },
+    PerimeterTooLarge {
+        measure: &'static str,
+        perimeter: f64,
+        most: f64,
+        eps: f64,
+    },
+    #[error("the {measure} {} does not fit a box of the {measure} {}", rounded(*.volume), rounded(*.box_volume))]
+    VolumeTooLarge {
+        measure: &'static str,
+        volume: f64,
+        box_volume: f64,
+    },
     #[error(
         "a region of {marked} of {marks} nodes does not fit a grid of {nodes} nodes; it needs nodes of that grid, one at least"
     )]

@@ -4,6 +4,7 @@ use geometry::zero_set::{least_perimeter, reduced_volume};
 use geometry::{Grid, PhaseField, ZeroSet};
 use serde::{Deserialize, Serialize};
 
+use crate::constraints::names;
 use crate::{Constraints, Error};
 
 /// Balls that are measured are round to this part of their perimeter.
@@ -121,7 +122,11 @@ impl Held {
             (Some(perimeter), Some(volume))
                 if perimeter < (1.0 + ROUND) * least_perimeter(grid, volume) =>
             {
-                Err(Error::LeastPerimeter { perimeter, volume })
+                Err(Error::LeastPerimeter {
+                    names: names::<D>(),
+                    perimeter,
+                    volume,
+                })
             }
             _ => Ok(()),
         }

@@ -90,7 +90,7 @@ pub use energy::{
     EnergyTerm, EnergyTerms, Helfrich, MinimizingMovement, MovementGraph, Objective, Pressure,
     SpontaneousCurvature, Tension, TermCheck,
 };
-pub use error::Error;
+pub use error::{Error, rounded};
 pub use euler::Euler;
 pub use held::{Held, Target};
 pub use mean_curvature::{

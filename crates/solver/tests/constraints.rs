@@ -328,7 +328,7 @@ fn targets_that_cannot_be_are_refused() {
             error,
             Error::NotHeld {
                 step: 1,
-                measure: "perimeter",
+                measure: "length",
                 ..
             }
         ),
