@@ -31,7 +31,7 @@ impl Drawing {
             let n = Axis::log("cells per unit length n");
             let chart = LineChart::new(flow.title(), n, Axis::log("mean L² error"));
             let point = |one: &Averages| [one.variant.n as f64, one.error()];
-            self.over_resolutions(flow, chart, point)
+            self.with_curves(chart, self.over_resolutions(flow, point))
         });
         let title = format!("Error on circles at t = {:.4}", self.end());
         (Figure::new(title, 2).with_panels(charts)).with_shared_legend()
@@ -82,7 +82,7 @@ impl Drawing {
         let chart = LineChart::new("", Axis::log("wall time per circle [s]"), error);
         let point = |one: &Averages| [one.seconds, one.error()];
         Figure::new("Willmore flow of circles: accuracy against cost", 1)
-            .with_panel(self.over_resolutions(Flow::Willmore, chart, point))
+            .with_panel(chart.with_curves(self.over_resolutions(Flow::Willmore, point)))
             .with_shared_legend()
             .with_note(format!(
                 "{} time steps; mean over {} circles, each on one core.",
@@ -126,21 +126,23 @@ impl Drawing {
         chart.with_curves(curves).with_entries(entries)
     }
 
-    /// A curve for each method, a point for each of its resolutions.
-    fn over_resolutions(
-        &self,
-        flow: Flow,
-        chart: LineChart,
-        point: impl Fn(&Averages) -> [f64; 2],
-    ) -> LineChart {
-        let curves = study::discretizations().map(|discretization| {
-            let own = self.of_flow(flow);
-            let own = own.filter(|one| one.variant.discretization == discretization);
-            Series::of(discretization.label(), own, &point)
+    /// A curve for each method, a point for each of its resolutions, which the name of the curve has.
+    fn over_resolutions(&self, flow: Flow, point: impl Fn(&Averages) -> [f64; 2]) -> Vec<Series> {
+        let own = |discretization| {
+            let averages = self.of_flow(flow);
+            averages.filter(move |one| one.variant.discretization == discretization)
+        };
+        let shown = study::discretizations().filter(|&one| own(one).next().is_some());
+        let curve = |discretization: Discretization| {
+            let cells: Vec<String> = own(discretization)
+                .map(|one| one.variant.n.to_string())
+                .collect();
+            let name = format!("{}, n = {}", discretization.label(), cells.join(", "));
+            Series::of(name, own(discretization), &point)
                 .with_colour(study::colour(discretization))
                 .with_marker(Marker::Circle)
-        });
-        self.with_curves(chart, curves)
+        };
+        shown.map(curve).collect()
     }
 
     /// A panel for each resolution, a curve for each method. All have the same range of values.

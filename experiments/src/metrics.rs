@@ -190,7 +190,7 @@ pub fn page(experiments: &[&Experiment]) -> String {
             [(meaning, _)] => (*meaning).to_owned(),
             several => {
                 let each = several.iter();
-                let each = each.map(|(meaning, where_)| format!("in {}: {meaning}", code(where_)));
+                let each = each.map(|(meaning, users)| format!("in {}: {meaning}", code(users)));
                 each.collect::<Vec<_>>().join("; ")
             }
         };

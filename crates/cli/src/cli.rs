@@ -61,8 +61,9 @@ pub enum Command {
     Info,
     /// Check the computation of a time step on your own input
     ///
-    /// Taylor tests check the gradient and the Hessian of the energy of a time step, with the network of the scheme and without its calibration. The Hessian must be symmetric. If the program contains a CPU
-    /// backend that is not the chosen device, it also compares the gradients that the two compute.
+    /// Taylor tests check the gradient and the Hessian of the energy of a time step, with the network of the scheme and without its calibration. The
+    /// Hessian must be symmetric. If the program contains a CPU backend that is not the chosen device, it also compares the gradients that the two
+    /// compute.
     #[command(after_help = "Examples:
   willmore check logo.png
   willmore check builtin:torus --device wgpu")]

@@ -21,11 +21,18 @@ const EXTENSIONS: [&str; 9] = [
     "csv", "html", "json", "npy", "ply", "png", "svg", "toml", "vti",
 ];
 
+/// A number that the text prints.
+struct Printed {
+    number: String,
+    /// Where the run has it: a JSON file, and the name there.
+    file: String,
+    key: String,
+}
+
 struct Tutorial {
     /// With the options that make them quick.
     commands: Vec<Vec<String>>,
-    /// Numbers that the text prints, each with its file and its name there.
-    values: Vec<[String; 3]>,
+    values: Vec<Printed>,
     /// Files that the text names.
     files: BTreeSet<String>,
     /// Pictures with the files that they are copies of.
@@ -76,11 +83,12 @@ impl Tutorial {
                 for value in between(line, "<!-- value:", "-->") {
                     let (number, place) = value.split_once('=').unwrap();
                     let (file, key) = place.trim().split_once(' ').unwrap();
-                    let all = [number.trim(), file, key].map(str::to_owned);
-                    let printed = |text: &str| text.split(['|', ' ']).any(|word| word == all[0]);
-                    let lines = markdown.lines().filter(|line| !line.starts_with("<!--"));
-                    assert!(lines.into_iter().any(printed), "{number} is not printed");
-                    tutorial.values.push(all);
+                    let [number, file, key] =
+                        [number, file, key].map(|word| word.trim().to_owned());
+                    let has_it = |text: &str| text.split(['|', ' ']).any(|word| word == number);
+                    let mut lines = markdown.lines().filter(|line| !line.starts_with("<!--"));
+                    assert!(lines.any(has_it), "{number} is not printed");
+                    tutorial.values.push(Printed { number, file, key });
                 }
                 for copy in between(line, "<!-- picture:", "-->") {
                     let (picture, file) = copy.split_once('=').unwrap();
@@ -120,7 +128,7 @@ fn the_tutorial_runs_as_printed() {
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{command:?}: {error}");
     }
-    for [number, file, key] in &tutorial.values {
+    for Printed { number, file, key } in &tutorial.values {
         let found = std::fs::read_to_string(folder.path().join(file)).unwrap();
         let found: serde_json::Value = serde_json::from_str(&found).unwrap();
         let digits = number.split_once('.').map_or(0, |(_, digits)| digits.len());
