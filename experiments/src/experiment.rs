@@ -34,7 +34,7 @@ pub struct ResultFolder {
     /// What it is, in a sentence or two.
     pub description: &'static str,
     pub figures: Figures,
-    /// Options with which `scripts/regenerate_figures` makes it again; none if something else does.
+    /// Options with which `scripts/regenerate_figures` makes it again; none if something else does, which the head of that script names.
     pub options: Option<&'static str>,
 }
 

@@ -16,7 +16,7 @@ struct Options {
     #[arg(long)]
     write: bool,
 
-    /// Lists the results that are kept, cheapest first: folder, experiment and options of each
+    /// Lists the results that are made again, cheapest first and the paper's numbers last: folder, experiment and options of each
     #[arg(long, conflicts_with = "write")]
     results: bool,
 }

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use report::{Manifest, Summary};
 use runs::Interrupt;
+use serde::de::DeserializeOwned;
 
 use crate::options::RunOptions;
 use crate::prelude::libraries::*;
@@ -174,4 +175,35 @@ impl Session {
 pub fn remove_folder(folder: &OutputDir) -> Result<()> {
     let path = folder.as_path();
     Ok(std::fs::remove_dir_all(path).map_err(files::Error::of("remove", path))?)
+}
+
+/// What is stored in a file, if it is there, readable, and belongs to this key.
+pub fn load<T: DeserializeOwned>(file: &Path, key: &Value) -> Option<T> {
+    let (found, stored): (Value, T) = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+    (found == *key).then_some(stored)
+}
+
+/// Stores something with all that it depends on, its key, whole or not at all.
+pub fn store(file: &Path, key: &Value, stored: &impl Serialize) -> Result<(), files::Error> {
+    let text = serde_json::to_string(&(key, stored)).map_err(std::io::Error::from);
+    files::write_atomically(file, |out| out.write_all(text?.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checkpoints_belong_to_their_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.json");
+        let (key, values) = (json!({ "x": 0.1 + 0.2 }), vec![1.0 / 3.0, -0.0]);
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+        store(&file, &key, &values).unwrap();
+        let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+        assert_eq!(load(&file, &key).map(bits), Some(bits(values)));
+        assert_eq!(load::<Vec<f64>>(&file, &json!({ "x": 0.3 })), None);
+        std::fs::write(&file, "{").unwrap();
+        assert_eq!(load::<Vec<f64>>(&file, &key), None);
+    }
 }

@@ -6,6 +6,7 @@ use std::fs;
 use std::process::Command;
 
 use experiments::derived::{self, root};
+use experiments::experiment::ResultFolder;
 use experiments::metrics;
 use experiments::programs::EXPERIMENTS;
 
@@ -103,6 +104,25 @@ fn the_results_are_those_of_the_experiments() {
     }
     let runs = derived::runs(&root(), EXPERIMENTS);
     assert!(runs.contains(&"stomatocytes vesicles --branches stomatocyte".to_owned()));
+    let last = runs.last().map(String::as_str);
+    assert_eq!(last, Some("paper_numbers paper_numbers"));
+}
+
+#[test]
+fn results_that_are_not_made_again_are_named() {
+    let script = read("scripts/regenerate_figures");
+    let header = script.split("set -euo").next().unwrap_or_default();
+    let page = read("results/README.md");
+    let sentence = page.split("makes them again, but for").nth(1);
+    let sentence = sentence.and_then(|rest| rest.split("The numbers of").next());
+    let sentence = sentence.expect("it says what is not made again");
+    let folders = EXPERIMENTS.iter().flat_map(|one| one.results);
+    for ResultFolder { name, .. } in folders.filter(|folder| folder.options.is_none()) {
+        let is_named = header.contains(&format!("results/{name}"));
+        assert!(is_named, "scripts/regenerate_figures does not name {name}");
+        let is_named = sentence.contains(&format!("`{name}`"));
+        assert!(is_named, "results/README.md does not name {name}");
+    }
 }
 
 #[test]

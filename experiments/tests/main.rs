@@ -3,4 +3,6 @@
 mod common;
 mod documents;
 mod programs;
+#[cfg(unix)]
+mod regenerate;
 mod surfaces;

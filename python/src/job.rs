@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use willmore::jobs::{self, Job, Opened, Results, StepState, Steps, settings};
 use willmore::prelude as w;
 
-use crate::error::{detached, in_python, of_job, raised};
+use crate::error::{Error, detached, in_python, of_job, raised};
 use crate::input::Input;
 use crate::shape::{FieldArray, PyShape, field_array};
 use crate::watcher::watched;
@@ -25,6 +25,10 @@ fn job(name: &str, input: &Input, options: &Options, mask: Option<&Input>) -> Py
     job.input().input = Some(input.0.clone());
     if let Job::Inpaint(inpaint) = &mut job {
         inpaint.mask = mask.map(|mask| mask.0.clone());
+    } else if mask.is_some() {
+        let message =
+            format!("`mask` is the region of `inpaint`, and the job is {name}: leave it out");
+        return Err(Error::new_err(message));
     }
     Ok(job)
 }
@@ -109,12 +113,14 @@ pub fn run(
     Ok(PyResults::new(results, watcher.warnings(), watcher.notes()))
 }
 
-/// The labels of a segmentation but 0; nothing if it holds none.
+/// The labels of a segmentation but 0, of which there must be some. It is read with these options of `fair`.
 #[pyfunction]
-pub fn labels(py: Python<'_>, input: &Input) -> PyResult<Vec<i64>> {
+pub fn labels(py: Python<'_>, input: &Input, options: Options) -> PyResult<Vec<i64>> {
+    let options: jobs::FairOptions = jobs::options_of(named(&options)).map_err(of_job)?;
     let options = jobs::InputOptions {
+        input: Some(input.0.clone()),
         label: Some(w::Label::All),
-        ..jobs::InputOptions::of(input.0.clone())
+        ..options.input
     };
     let labels = detached(py, || jobs::labels(&options).map_err(of_job))?;
     Ok(labels.unwrap_or_default())

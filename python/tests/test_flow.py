@@ -322,3 +322,16 @@ def test_refused(shape, options):
     with pytest.raises(willmore.Error) as refused:
         willmore.flow(shape, **options)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("place", [{"spacing": 0.1}, {"origin": (0, 0)}])
+def test_only_a_field_that_is_an_array_has_a_place(square, sphere, place, tmp_path):
+    for shape in ("builtin:cross", square, square.astype(np.uint8), sphere):
+        for act in (
+            lambda: willmore.flow(shape, **place),
+            lambda: willmore.energy(shape, **place),
+            lambda: willmore.inpaint(shape, "ball:0,0,0.1", **place),
+            lambda: willmore.Run.start("flow", shape, tmp_path / "run", **place),
+        ):
+            with pytest.raises(willmore.Error, match="`spacing` and `origin`"):
+                act()

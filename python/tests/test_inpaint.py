@@ -54,6 +54,35 @@ def test_fields_stay_outside_of_the_mask_bit_for_bit():
     assert len(x) and x.min() > 7.9 and x.max() < 9.5 and y.min() > 8.5 and y.max() < 10.3
 
 
+@pytest.mark.parametrize("dimension, options", [(2, {}), (2, {"box_side": 1.5}), (3, {})])
+def test_a_mask_marks_the_nodes_of_a_field_in_a_file(dimension, options, tmp_path):
+    side = options.get("box_side", {2: 2.0, 3: 1.0}[dimension])
+    cells = 48 if dimension == 2 else 24
+    nodes = np.mgrid[(slice(cells),) * dimension] * side / cells - side / 2
+    # Larger along the first axis, and the mask is on one side of it.
+    radius = np.linalg.norm(nodes / np.reshape([1.3, 1.0, 1.0][:dimension], (dimension,) + (1,) * dimension), axis=0)
+    field = np.tanh((0.25 * side - radius) / (np.sqrt(2) * 2 * side / cells))
+    mask = np.zeros(field.shape, bool)
+    mask[(slice(3 * cells // 5, 4 * cells // 5),) + (slice(cells // 3, 3 * cells // 5),) * (dimension - 1)] = True
+    np.save(tmp_path / "field.npy", field)
+    of_array = willmore.inpaint(field, mask, ansatz="empty", spacing=side / cells, origin=-side / 2, steps=2)
+    of_file = willmore.inpaint(tmp_path / "field.npy", mask, ansatz="empty", steps=2, **options)
+    assert np.array_equal(of_file.field, of_array.field)
+    assert np.array_equal(of_file.field[~mask], field[~mask]) and (of_file.field[mask] != field[mask]).mean() > 0.9
+    run = willmore.Run.start("inpaint", tmp_path / "field.npy", tmp_path / "run", mask=mask, ansatz="empty", steps=2, **options)
+    assert np.array_equal(run.field, of_array.field)
+
+
+def test_a_mask_of_a_file_has_the_shape_of_its_field(square, tmp_path):
+    np.save(tmp_path / "field.npy", circle_field()[0])
+    with pytest.raises(willmore.Error, match=r"\(48, 40\).*that of the field, \(48, 48\)"):
+        willmore.inpaint(tmp_path / "field.npy", square)
+    # An array of 0 and 1 in space is a volume of voxels, which has no nodes.
+    np.save(tmp_path / "voxels.npy", np.pad(np.ones((4, 4, 4)), 2))
+    with pytest.raises(willmore.Error, match="region such as"):
+        willmore.inpaint(tmp_path / "voxels.npy", np.pad(np.ones((2, 2, 2), bool), 3))
+
+
 def test_large_fields_stay_outside_of_the_mask_bit_for_bit():
     field, _ = circle_field(cells=128)
     mask = np.zeros(field.shape, bool)

@@ -177,6 +177,12 @@ def test_remesh(noisy):
     assert len(result.to_trimesh().faces) == result.to_pyvista().n_cells == len(mesh.faces)
 
 
+def test_a_new_mesh_has_faces_of_a_type_that_holds_them(noisy):
+    mesh = willmore.fair((noisy[0], noisy[1].astype(np.uint8)), remesh=True, **OPTIONS).mesh
+    assert len(mesh.vertices) > 256 and mesh.faces.max() == len(mesh.vertices) - 1
+    assert volume(*mesh) == pytest.approx(volume(*noisy), rel=0.02)
+
+
 def test_energy_ratio_keeps_the_volume_unless_told_otherwise(noisy):
     kept = willmore.fair(noisy, energy_ratio=0.99, cells=24)
     assert volume(*kept.mesh) == pytest.approx(volume(*noisy), rel=1e-6)

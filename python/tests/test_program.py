@@ -196,6 +196,9 @@ def test_refused_runs(tmp_path):
         willmore.Run.start("flown", "builtin:cross", tmp_path / "run")
     with pytest.raises(willmore.Error, match="`stepps`"):
         willmore.Run.start("flow", "builtin:cross", tmp_path / "run", stepps=3)
+    with pytest.raises(willmore.Error, match="`mask`.*flow"):
+        willmore.Run.start("flow", "builtin:cross", tmp_path / "run", mask="ball:0,0,0.2", cells=24, steps=1)
+    assert not (tmp_path / "run").exists()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "letter.txt").write_text("Dear")
     with pytest.raises(willmore.Error):

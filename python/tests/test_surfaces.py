@@ -166,3 +166,16 @@ def test_a_file_by_its_name(tmp_path):
     (of_array,) = willmore.surfaces(labels, spacing=2, cells=24).items()
     assert of_file[0] == of_array[0] == 3
     assert np.array_equal(of_file[1].field, of_array[1].field)
+
+
+def test_labels_are_those_of_the_frame(tmp_path):
+    labels = np.zeros((16, 16, 16, 2), np.uint8)
+    labels[4:12, 4:12, 4:12, 0], labels[5:11, 5:11, 5:11, 1] = 3, 7
+    path = tmp_path / "labels.nii.gz"
+    nibabel.save(nibabel.Nifti1Image(labels, np.eye(4)), path)
+    assert list(willmore.surfaces(path, frame=0, **QUICK)) == [3]
+    (of_file,) = willmore.surfaces(path, frame=1, **QUICK).items()
+    assert of_file[0] == 7
+    assert np.array_equal(of_file[1].field, willmore.surfaces(labels[..., 1], **QUICK)[7].field)
+    with pytest.raises(willmore.Error, match="`frame`"):
+        willmore.surfaces(path, **QUICK)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Callable
+from typing import Any, Callable, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,24 @@ class Source:
 
 def of_shape(shape: Any, *, spacing: Any = None, origin: Any = None, fixed: Any = None) -> Source:
     """A mesh, an image, a field, or a name."""
+    source = _without_nodes(shape, fixed)
+    if source is not None:
+        if not (spacing is None and origin is None):
+            raise Error("`spacing` and `origin` are for a field that is an array, which this shape is not: leave them out")
+        return source
+    array = _meshes.array("shape", shape)
+    if np.issubdtype(array.dtype, np.floating) and array.ndim in (2, 3):
+        return Source(of_field(array, spacing, origin))
+    if array.ndim == 3 and array.dtype != object:
+        raise Error(f"an array of {array.dtype} in three dimensions holds voxels: `surfaces` makes smooth surfaces of them")
+    raise Error(
+        f"{type(shape).__name__} is no shape: give a mesh, (vertices, faces), an image (bool or uint8), a field (float, two or three dimensions), "
+        'or a name such as "scan.ply" or "builtin:torus"'
+    )
+
+
+def _without_nodes(shape: Any, fixed: Any) -> Source | None:
+    """A name, a mesh or an image, which say themselves where they are; None for anything else."""
     name = _meshes.of_path(shape)
     if name is not None:
         if fixed is not None:
@@ -40,14 +58,7 @@ def of_shape(shape: Any, *, spacing: Any = None, origin: Any = None, fixed: Any 
     if array.dtype == np.uint8 and (array.ndim == 2 or array.ndim == 3 and array.shape[2] in (3, 4)):
         own = pixels(array)
         return Source(Input.picture(own), image=_as_image(array), pixels=own)
-    if np.issubdtype(array.dtype, np.floating) and array.ndim in (2, 3):
-        return Source(of_field(array, spacing, origin))
-    if array.ndim == 3 and array.dtype != object:
-        raise Error(f"an array of {array.dtype} in three dimensions holds voxels: `surfaces` makes smooth surfaces of them")
-    raise Error(
-        f"{type(shape).__name__} is no shape: give a mesh, (vertices, faces), an image (bool or uint8), a field (float, two or three dimensions), "
-        'or a name such as "scan.ply" or "builtin:torus"'
-    )
+    return None
 
 
 def _of_mesh(mesh: _meshes.Kind, fixed: Any) -> Input:
@@ -129,8 +140,48 @@ def _usual(pixels: np.ndarray, tone: int) -> np.ndarray:
     return np.array([*(colour[:3] * opacity), opacity])
 
 
-def of_mask(shape: Any, mask: Any, spacing: Any, origin: Any) -> Input:
-    """The region of an inpainting: a name, or an array of the shape of the image or the field."""
+class _Nodes(NamedTuple):
+    """How many nodes a field has along each axis, and where they are."""
+
+    shape: tuple[int, ...]
+    spacing: Any
+    origin: Any
+
+
+def _nodes(shape: Any, spacing: Any, origin: Any, options: dict[str, Any]) -> _Nodes | None:
+    """The nodes of a field, which is an array or a file; None for shapes of other kinds."""
+    name = _meshes.of_path(shape)
+    if name is not None:
+        return _nodes_of_file(name, options)
+    if _meshes.of(shape) is not None or not np.issubdtype(np.asarray(shape).dtype, np.floating):
+        return None
+    return _Nodes(np.shape(shape), spacing, origin)
+
+
+def _nodes_of_file(name: str, options: dict[str, Any]) -> _Nodes | None:
+    """The nodes of a field in a file. They fill the box, which is about 0."""
+    try:
+        values = np.lib.format.open_memmap(name, mode="r") if name.lower().endswith(".npy") else None
+    except (OSError, ValueError):
+        # The library says what is wrong with it.
+        return None
+    given = {option.replace("-", "_"): value for option, value in options.items() if value is not None}
+    if values is None or not np.issubdtype(values.dtype, np.floating) or values.ndim not in (2, 3) or _is_volume(values, given):
+        return None
+    # The default is that of the option.
+    side = numbers("box_side", given.get("box_side", 2.0 if values.ndim == 2 else 1.0), 1)[0]
+    return _Nodes(values.shape, side / max(values.shape[0], 1), -0.5 * side)
+
+
+def _is_volume(values: np.ndarray, given: dict[str, Any]) -> bool:
+    """Whether the library takes values in a file as those of voxels."""
+    if values.ndim == 2 or "field_kind" in given:
+        return False
+    return "threshold" in given or "label" in given or bool(((values == 0) | (values == 1)).all())
+
+
+def of_mask(shape: Any, mask: Any, spacing: Any, origin: Any, options: dict[str, Any]) -> Input:
+    """The region of an inpainting with these options: a name, or an array of the shape of the image or the field."""
     name = _meshes.of_path(mask)
     if name is not None:
         return Input.named(name)
@@ -141,11 +192,11 @@ def of_mask(shape: Any, mask: Any, spacing: Any, origin: Any) -> Input:
         raise Error("`mask` is true nowhere: there is no region to fill")
     if mask.all():
         raise Error("`mask` is true everywhere: nothing is left that could continue into the region")
-    array = None if _meshes.of_path(shape) is not None or _meshes.of(shape) is not None else np.asarray(shape)
-    if array is not None and np.issubdtype(array.dtype, np.floating):
-        if mask.shape != array.shape:
-            raise Error(f"`mask` has the shape {mask.shape}; it must have that of the field, {array.shape}")
-        return of_field(np.where(mask, -1.0, 1.0), spacing, origin)
+    nodes = _nodes(shape, spacing, origin, options)
+    if nodes is not None:
+        if mask.shape != nodes.shape:
+            raise Error(f"`mask` has the shape {mask.shape}; it must have that of the field, {nodes.shape}")
+        return of_field(np.where(mask, -1.0, 1.0), nodes.spacing, nodes.origin)
     if mask.ndim == 3:
         raise Error("`mask` of a shape in space is a region such as 'ball:x,y,z,r', or an array of the shape of a field")
     ink = np.zeros((*mask.shape, 4), dtype=np.uint8)

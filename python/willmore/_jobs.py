@@ -197,7 +197,7 @@ def surfaces(
             raise Error("`threshold` and `label` are two ways to say what is inside: give one of them")
         return {1: _run("fair", source, {**options, "threshold": threshold}, progress)}
     if voxels is None and label is None:
-        wanted = _willmore.labels(source.input)
+        wanted = _willmore.labels(source.input, in_memory(options))
     else:
         wanted = _labels_of(np.array([]) if voxels is None else voxels.values, label)
     return {one: _run("fair", source, {**options, "label": one}, progress) for one in wanted}
@@ -252,7 +252,8 @@ def flow(
         A mesh; an image, which is an array of bool or uint8; a field, which is an array of float with as many nodes along each axis, 1 inside and -1
         outside; the name of a file; or a built-in shape such as ``"builtin:torus"``.
     spacing, origin : optional
-        The distance of neighbouring nodes of a field, and the position of its first node; by default 1 and 0.
+        The distance of neighbouring nodes of a field that is an array, and the position of its first node; by default 1 and 0. A field in a file
+        fills the box, whose middle is 0.
     field_kind : {"phase-field", "distance"}, optional
         The values of a field: a phase field (default), whose profile across the interface is ``tanh(-3 s / (4 eps))`` at the signed distance ``s``,
         with ``eps`` of two cells; or signed distances, negative inside, of which the package makes one.
@@ -374,8 +375,8 @@ def inpaint(
     shape
         An image, a mesh, a field or a name, as in `flow`.
     mask : array of bool, or str
-        The region: an array of the shape of the image or field, or ``"box:x0,y0,x1,y1"``, ``"ball:x,y,r"``, in 3D with z. For an image, regions are in
-        pixels from the lower left corner.
+        The region: an array of the shape of the image or field, also of one in a file, or ``"box:x0,y0,x1,y1"``, ``"ball:x,y,r"``, in 3D with z. For an
+        image, regions are in pixels from the lower left corner.
     ansatz : str, optional
         The shape in the region at the beginning: ``"keep"`` (default), ``"empty"``, ``"full"``, or a region.
     spacing, origin, field_kind, steps, cells, progress, **more
@@ -393,7 +394,7 @@ def inpaint(
     """
     source = _inputs.of_shape(shape, spacing=spacing, origin=origin)
     options = {"ansatz": ansatz, "field_kind": field_kind, "steps": steps, "cells": cells, **more}
-    return _run("inpaint", source, options, progress, mask=_inputs.of_mask(shape, mask, spacing, origin))
+    return _run("inpaint", source, options, progress, mask=_inputs.of_mask(shape, mask, spacing, origin, options))
 
 
 def repair(mesh: Any) -> Any:

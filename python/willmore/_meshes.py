@@ -103,6 +103,8 @@ class _OfArrays:
         of_vertices, of_faces = self._kinds
         if not np.issubdtype(of_vertices, np.floating):
             of_vertices = np.dtype(np.float64)
+        if len(vertices) - 1 > np.iinfo(of_faces).max:
+            of_faces = np.promote_types(of_faces, np.min_scalar_type(len(vertices) - 1))
         return Arrays(vertices.astype(of_vertices), faces.astype(of_faces))
 
 

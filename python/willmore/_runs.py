@@ -99,7 +99,7 @@ class Run:
         if isinstance(options.get("network"), Network):
             raise Error("`network` of a run must be a file, which is there when the run is resumed: save the network, and give its path")
         source = _inputs.of_shape(shape, spacing=spacing, origin=origin)
-        region = None if mask is None else _inputs.of_mask(shape, mask, spacing, origin)
+        region = None if mask is None else _inputs.of_mask(shape, mask, spacing, origin, options)
         given = named({**source.options, **options, "output": folder})
         outcome, warnings = _willmore.run_in_folder(job, source.input, given, told(progress), region)
         return cls(folder)._ended(outcome, warnings)

@@ -93,7 +93,14 @@ def test_names_of_runs_are_unique(sweep_folder: Path):
 @pytest.mark.parametrize(
     ("row", "line"),
     [
-        ("sweep\tscans\t", 'row 2 (sweep), column folder: "sweep" is not a name of letters, digits and . _ = + -, other than sweep; correct it'),
+        (
+            "sweep\tscans\t",
+            'row 2 (sweep), column folder: "sweep" is not a name of letters, digits and . _ = + -, other than sweep and without _steps at its end; correct it',
+        ),
+        (
+            "a_steps\tscans\t",
+            'row 2 (a_steps), column folder: "a_steps" is not a name of letters, digits and . _ = + -, other than sweep and without _steps at its end; correct it',
+        ),
         ("a\tnowhere\t", "row 2 (a), column path: there is no folder nowhere; correct the path, which begins at the folder of the sweep"),
         ("a\tscans\t*.nii", "row 2 (a), column path: scans has no meshes or volumes that match *.nii; correct the path or the column files"),
     ],
@@ -122,6 +129,12 @@ def test_errors_of_the_configuration(sweep_folder: Path, text: str, line: str):
     assert len(found) == 1 and found[0].startswith(line)
 
 
+def test_numbers_as_unknown_entries_of_the_configuration(sweep_folder: Path):
+    (sweep_folder / "config/config.yaml").write_text("7: config/runs.tsv\nrums: config/runs.tsv\n")
+    entry = "config/config.yaml, {}: there is no such entry; {}"
+    assert lines(sweep_folder) == [entry.format("7", "remove it"), entry.format("rums", "a similar one is runs")]
+
+
 def test_a_program_that_is_missing(sweep_folder: Path):
     (sweep_folder / "config/config.yaml").write_text("runs: config/runs.tsv\nprogram: wilmore\n")
     (sweep_folder / "config/runs.tsv").write_text(HEADER + "a\tflow\tbuiltin:cross\n")
@@ -143,6 +156,16 @@ def test_lists_become_all_combinations(sweep_folder: Path):
     runs = tables.load("runs.yaml", None)["sweep"]
     assert [run.name for run in runs] == ["plane_cross_1pct", "plane_cross_0.001", "plane_ring_1pct", "plane_ring_0.001", "one"]
     assert runs[1].options == {"tolerance": 0.001, "time": 1e-4, "repair": False}
+
+
+def test_whole_numbers_with_a_point_are_whole_numbers(sweep_folder: Path):
+    entry = {"run": "a", "command": "fair", "input": "builtin:figure", "cells": [64.0, 32.5], "label": 3.0, "noise": 2.0}
+    (sweep_folder / "runs.yaml").write_text(yaml.safe_dump([{**entry, "cells": 64.0}]))
+    (run,) = tables.load("runs.yaml", None)["sweep"]
+    assert {name: repr(value) for name, value in run.options.items()} == {"cells": "64", "label": "3", "noise": "2.0"}
+    (sweep_folder / "runs.yaml").write_text(yaml.safe_dump([entry]))
+    with pytest.raises(tables.TableError, match='"32.5" is not a whole number of cells'):
+        tables.load("runs.yaml", None)
 
 
 def test_files_of_folders_have_names_of_their_own(sweep_folder: Path):

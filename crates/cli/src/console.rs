@@ -43,20 +43,21 @@ pub struct Console {
 struct Begun {
     command: &'static str,
     folder: PathBuf,
-    /// Whether the file to which its result goes is there already.
-    is_saved: bool,
+    /// The file to which its result goes, if one was chosen.
+    save: Option<PathBuf>,
 }
 
 impl Begun {
     /// How to go on with it.
     fn advice(&self) -> String {
-        advice(&self.folder, self.is_saved)
+        advice(&self.folder, self.save.as_deref())
     }
 }
 
-/// How to go on with an interrupted run.
-pub(crate) fn advice(folder: &Path, is_saved: bool) -> String {
-    // What was there already is to be written over by whoever goes on, too.
+/// How to go on with an interrupted run whose result goes to this file.
+pub(crate) fn advice(folder: &Path, save: Option<&Path>) -> String {
+    // What is there by now, perhaps from the end of this run, is to be written over by whoever goes on, too.
+    let is_saved = save.is_some_and(Path::exists);
     let force = if is_saved { " --force" } else { "" };
     format!(
         "interrupted, go on with: willmore resume {}{force}",
@@ -217,7 +218,7 @@ impl Watcher for Console {
         *lock(&self.begun) = Some(Begun {
             command,
             folder: folder.to_owned(),
-            is_saved: save.is_some_and(Path::exists),
+            save: save.map(Path::to_owned),
         });
     }
 }
@@ -246,5 +247,26 @@ impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish();
         self.bars.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run that a signal ends after it has saved its result goes on by what it advises.
+    #[test]
+    fn what_is_saved_is_looked_at_when_the_run_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let save = folder.path().join("cross.svg");
+        let console = Console::new(io::sink(), io::sink());
+        console.stores("flow", Path::new("run"), Some(&save));
+        let advice = || {
+            let begun = lock(&console.begun);
+            begun.as_ref().map(Begun::advice).unwrap()
+        };
+        assert!(advice().ends_with("willmore resume run"));
+        std::fs::write(&save, "saved").unwrap();
+        assert!(advice().ends_with("willmore resume run --force"));
     }
 }

@@ -95,6 +95,38 @@ fn resolved_configurations() {
         });
 }
 
+/// What is stored of an option is read as what it was, however large a number is.
+#[test]
+fn the_largest_numbers_come_back() {
+    let program = Cli::command();
+    let mut read = Vec::new();
+    for command in ["flow", "fair", "inpaint", "mcf"] {
+        let options = program.find_subcommand(command).unwrap().get_arguments();
+        for name in options.filter_map(clap::Arg::get_long) {
+            let named = [(name, Some(u64::MAX.to_string()))];
+            let Ok(typed) = jobs::Job::of_named(command, named) else {
+                continue;
+            };
+            let stored = resolved(&typed).unwrap();
+            let again = job(&stored, Path::new(PATH)).unwrap();
+            assert_eq!(resolved(&again).unwrap(), stored);
+            read.push(name);
+        }
+    }
+    // Numbers of TOML end at 2^63 - 1.
+    for name in [
+        "cells",
+        "checkpoint-every",
+        "frame",
+        "frames",
+        "ramp",
+        "seed",
+        "steps",
+    ] {
+        assert!(read.contains(&name), "{name}: {read:?}");
+    }
+}
+
 /// The defaults of the library are those of the program.
 #[test]
 fn defaults_are_those_of_the_library() {

@@ -182,3 +182,13 @@ fn tensions_are_in_the_units_of_the_input() {
     assert!((free - 1.32_f64.sqrt()).abs() < 0.02, "{free}");
     assert!((taut - 1.0).abs() < 0.02, "{taut}");
 }
+
+/// A size that goes to its target much faster than the shape can follow.
+#[test]
+fn sizes_that_change_too_fast_need_a_longer_ramp() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = "flow builtin:rectangle --length 50% --area 30% --cells 32 --tau 1e-14 --no-page";
+    let refused = (program(folder.path()).args(flow.split(' ')).output()).unwrap();
+    let said = text(&refused.stderr);
+    assert!(said.contains("give a larger --ramp"), "{said}");
+}

@@ -4,7 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use willmore::jobs::Progress;
-use willmore::prelude::{FlowOptions, Interrupt, Job, Watcher, run_in_folder};
+use willmore::prelude::{
+    FlowOptions, Interrupt, Job, RunDirectory, Silent, Watcher, run_in_folder,
+};
 
 use crate::common::{files, outcome, run, text};
 
@@ -102,6 +104,37 @@ fn a_run_that_is_not_finished_shows_its_surface() {
     for label in ["before", "step 1"] {
         assert!(html.contains(&format!("data-label=\"{label}\"")), "{label}");
     }
+}
+
+/// As Ctrl-C does, before the first of its further steps is over.
+#[test]
+fn a_run_that_goes_on_is_interrupted_at_once_and_has_its_page() {
+    struct Interrupted(Interrupt);
+
+    impl Watcher for Interrupted {
+        fn interrupt(&self) -> Result<Interrupt, willmore::runs::Error> {
+            self.0.request();
+            Ok(self.0.clone())
+        }
+    }
+
+    let folder = tempfile::tempdir().unwrap();
+    let disc = ["flow", "builtin:disc", "--cells", "16", "--steps", "1"];
+    outcome(folder.path(), &[&disc[..], &["--output", "run"]].concat());
+    let resume = |more: Option<usize>, watcher: &dyn Watcher| {
+        let stored = RunDirectory::open(folder.path().join("run")).unwrap();
+        let job = willmore::jobs::settings::job_of(&stored).unwrap();
+        willmore::jobs::resume(job, stored, more, watcher).unwrap()
+    };
+    for more in [Some(3), None] {
+        let outcome = resume(more, &Interrupted(Interrupt::never()));
+        assert!(outcome.summary.is_none() && outcome.steps == 1);
+        let html = page(folder.path(), "run");
+        assert!(html.contains("Not finished: 1 step"), "{more:?}");
+        assert!(html.contains("Steps as a table"), "{more:?}");
+    }
+    let outcome = resume(None, &Silent);
+    assert!(outcome.summary.is_some() && outcome.steps == 3);
 }
 
 /// Keys are for programs: no entry begins with one.

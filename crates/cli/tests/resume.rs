@@ -177,7 +177,10 @@ fn a_run_that_was_never_over_writes_over_no_file() {
     }
     std::fs::write(&saved, "mine").unwrap();
     let refused = run(folder.path(), &["resume", "run"]);
-    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
+    let line = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{line}");
+    // There is no option for another name.
+    assert!(line.contains("move it away, or give --force"), "{line}");
     assert_eq!(std::fs::read(saved).unwrap(), b"mine");
 }
 

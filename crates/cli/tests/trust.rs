@@ -144,6 +144,39 @@ fn nothing_is_written_over_what_is_there() {
     assert!(at("run/final.npy").exists());
 }
 
+/// Under the name of a file of the run, the saved file would damage it.
+#[test]
+fn nothing_is_saved_among_the_files_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("run");
+    fs::create_dir(&own).unwrap();
+    for (place, output, save) in [
+        (folder.path(), "run", "run/start.svg"),
+        (folder.path(), "run", "run/mine.png"),
+        (&*own, ".", "final.svg"),
+    ] {
+        let line = refused(place, &[&DISC[..], &[output, "--save", save]].concat());
+        assert!(line.contains("in the folder of --output"), "{line}");
+        assert_eq!(fs::read_dir(&own).unwrap().count(), 0, "{save}");
+    }
+    let beside = ["run", "--save", "start.svg"];
+    outcome(folder.path(), &[&DISC[..], &beside].concat());
+}
+
+/// There is no length that fits.
+#[test]
+fn a_box_without_room_is_refused_with_what_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = "flow builtin:disc --box-side 0.375 --steps 1 --no-page --cells";
+    let with_cells = |cells| -> Vec<&str> { flow.split(' ').chain([cells]).collect() };
+    let line = refused(folder.path(), &with_cells("8"));
+    assert!(
+        line.contains("use more --cells or a larger --box-side") && !line.contains("--side-length"),
+        "{line}"
+    );
+    outcome(folder.path(), &with_cells("64"));
+}
+
 /// Nobody may listen to what is told, which changes nothing else.
 #[test]
 fn a_closed_standard_error_is_no_failure() {

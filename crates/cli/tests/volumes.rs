@@ -498,6 +498,16 @@ fn every_label_becomes_a_surface() {
             &["sample", "two.nii", "--label", "all", "--save", "-"],
             &["several"],
         ),
+        (
+            &["fair", "builtin:sphere", "--label", "all"],
+            &["--label has no meaning for a built-in shape"],
+        ),
+        (
+            &[
+                "fair", "two.nii", "--label", "all", "--shared", "--up", "z", "--save", "a.ply",
+            ],
+            &["--up has no meaning with --shared"],
+        ),
     ] {
         let output = program(folder.path()).args(arguments).output().unwrap();
         let error = text(&output.stderr);
@@ -648,6 +658,48 @@ fn frames_are_chosen_and_what_is_no_number_is_told() {
     let expected = 4.0 / 3.0 * PI * 13_f64.powi(3);
     let volume = closed(&folder.path().join("two.ply")).volume();
     assert!((volume / expected - 1.0).abs() < 0.01, "{volume}");
+}
+
+/// Halves of a box in NRRD, labelled 1 and 2, with this value elsewhere.
+fn write_halves(path: &Path, outside: f32) {
+    let fields = "type: float\nencoding: raw\nendian: little\ndimension: 3\nsizes: 16 16 16\nspacings: 1 1 1";
+    let mut bytes = format!("NRRD0004\n{fields}\n\n").into_bytes();
+    for voxel in 0..16 * 16 * 16_usize {
+        let index = [voxel % 16, voxel / 16 % 16, voxel / 256];
+        let is_inside = index.iter().all(|i| (3..13).contains(i));
+        let label = if index[0] > 8 { 2.0 } else { 1.0 };
+        let value = if is_inside { label } else { outside };
+        bytes.extend(value.to_le_bytes());
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+/// What is no number is outside of all labels together, too, and it is told once, with the name of the file.
+#[test]
+fn shared_walls_are_the_same_around_what_is_no_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_halves(&at("zero.nrrd"), 0.0);
+    write_halves(&at("nan.nrrd"), f32::NAN);
+    let [zero, nan] = ["zero", "nan"].map(|name| {
+        let (input, walls) = (format!("{name}.nrrd"), format!("{name}.ply"));
+        let fair = ["fair", &input, "--label", "all", "--shared"];
+        let options = ["--cells", "24", "--steps", "2", "--save", &walls];
+        let output = run(folder.path(), &[&fair[..], &options].concat());
+        let told = text(&output.stderr);
+        assert!(output.status.success(), "{told}");
+        (std::fs::read(at(&walls)).unwrap(), told)
+    });
+    assert!(zero.0 == nan.0);
+    let warnings: Vec<&str> = (nan.1.lines())
+        .filter(|line| line.contains("are not a number (NaN): they are outside"))
+        .collect();
+    assert_eq!(warnings.len(), 1, "{}", nan.1);
+    assert!(
+        warnings[0].contains("nan.nrrd: ") && !nan.1.contains(".nrrd.nii"),
+        "{}",
+        nan.1
+    );
 }
 
 /// A plate of 36 x 36 x 5 voxels on a grid whose cells are two of them wide.

@@ -85,8 +85,8 @@ impl Store {
         Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 
-    /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The table of its
-    /// records and the files of its end, which `ends` names, stay and are no longer part of it.
+    /// Goes on with a finished run under other stop rules, and with other notes; `case` is the stored one but for those. The files of its
+    /// end, which `ends` names, stay and are no longer part of it.
     ///
     /// # Errors
     /// As [`Self::resume`]; [`Error::Stored`] if one of the stop rules holds already, and of Willmore flow for another end time, since steps
@@ -114,8 +114,7 @@ impl Store {
             };
             return Err(refused(&stored, stop.to_string()));
         }
-        let is_gone = |name: &str| name == METRICS || ends(name);
-        let directory = stored.reopen(&pack(&run, &notes)?, is_gone)?;
+        let directory = stored.reopen(&pack(&run, &notes)?, ends, |name| name == METRICS)?;
         Ok((Self::at(directory, notes, checkpoints, &run), run))
     }
 

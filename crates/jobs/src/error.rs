@@ -94,6 +94,17 @@ pub enum Error {
         /// The most.
         most: f64,
     },
+    /// A box that has no room for any shape.
+    #[error(
+        "the box of side {box_side} with `cells` {cells} has no room for a shape, whose distance from each side is to be an interface width: use more \
+         `cells` or a larger `box_side`"
+    )]
+    NoRoom {
+        /// The side of the box.
+        box_side: f64,
+        /// Cells per unit length.
+        cells: usize,
+    },
     /// Parts or holes would be lost on the grid.
     #[error("{loss}; {}", advice(*may_allow, *vertices_follow))]
     Lost {
@@ -192,6 +203,12 @@ pub enum Error {
     /// A file that would be written over.
     #[error("`save` {} is there already: give another name, or `force` to write over it", .0.display())]
     Exists(PathBuf),
+    /// A file that a run that goes on would write over.
+    #[error("{} of `save` is there already: move it away, or give `force` to write over it", .0.display())]
+    ExistsByNow(PathBuf),
+    /// A file among those of the run.
+    #[error("`save` {}: it would be in the folder of `output`, which is for the files of the run: give another folder", .0.display())]
+    SavedInTheRun(PathBuf),
     /// A file in the folder of a run that is not of the run.
     #[error(
         "{} is not of the run in this folder, which `force` would remove: move it away, or give another `output`",
@@ -226,6 +243,9 @@ pub enum Error {
     /// Time steps became too small.
     #[error("{}; the shape is not resolved, use more `cells`", files::with_causes(.0))]
     TooStiff(engine::Error),
+    /// Sizes change too fast.
+    #[error("{}; give a larger `ramp`", files::with_causes(.0))]
+    Hurried(engine::Error),
     /// From the loop over steps.
     #[error(transparent)]
     Engine(engine::Error),
@@ -293,9 +313,14 @@ fn or_allow_loss(may_allow: bool) -> &'static str {
 
 impl From<engine::Error> for Error {
     fn from(error: engine::Error) -> Self {
-        match error {
+        match &error {
+            engine::Error::Step { source, .. }
+                if matches!(**source, solver::Error::Rushed { .. }) =>
+            {
+                Self::Hurried(error)
+            }
             engine::Error::TooStiff { .. } => Self::TooStiff(error),
-            error => Self::Engine(error),
+            _ => Self::Engine(error),
         }
     }
 }

@@ -84,6 +84,11 @@ impl Input {
         Self::of_contents(format!("{name}.nii"), Contents::Volume(Arc::new(volume)))
     }
 
+    /// A volume that was read of this input, with its name.
+    pub(crate) fn with_volume(&self, volume: Volume) -> Self {
+        Self::of_contents(self.name.clone(), Contents::Volume(Arc::new(volume)))
+    }
+
     fn of_contents(name: String, contents: Contents) -> Self {
         Self {
             name,
@@ -271,8 +276,11 @@ impl File {
         Ok(head)
     }
 
-    /// The number of axes of an array of whole numbers, which are labels.
+    /// The number of axes of an array of whole numbers, which are labels; three of a volume in memory, whatever was read.
     pub fn axes_of_labels(&self) -> Result<Option<usize>> {
+        if let Some(Contents::Volume(_)) = &self.contents {
+            return Ok(Some(3));
+        }
         let axes = |array: &Array<'_>| array.number.is_integer().then_some(array.shape.len());
         Ok(self.of_array(axes)?.flatten())
     }

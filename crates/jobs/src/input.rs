@@ -442,26 +442,30 @@ impl<'a> Reader<'a> {
         Ok(attempt(self)?.0)
     }
 
-    /// Whether most of a shape is too thin even for the finest of some grids, by a part of its sides: then the others need not be tried.
+    /// Whether most of a shape is too thin even for the finest of some grids, by a part of its sides: then the others need not be tried. Of a grid
+    /// that is refused, such as one that takes more memory than there is, nothing is known: a coarser one may do.
     fn is_hopeless<const D: usize>(
         &mut self,
         bounds: &BoundingBox<D>,
         grids: &Grids,
         shape: &(impl SignedDistance<D> + ?Sized),
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
-    ) -> Result<bool> {
+    ) -> bool {
         /// At most so many sides.
         const TRIED: usize = 1024;
         let (cells, side_length) = (self.options.cells, self.options.side_length);
         if self.chosen.is_some() {
-            return Ok(false);
+            return false;
         }
         self.options.cells = grids.cells.last().copied();
-        let grid = self.grid_around(bounds, grids.part)?;
+        let finest = self.grid_around(bounds, grids.part);
         (self.options.cells, self.options.side_length) = (cells, side_length);
+        let Ok(grid) = finest else {
+            return false;
+        };
         let step = sides.clone().count().div_ceil(TRIED).max(1);
         let tried = sides.clone().step_by(step);
-        Ok(thin_part(shape, tried, self.thin_below(&grid)) > 2.0 * MOST_LOST)
+        thin_part(shape, tried, self.thin_below(&grid)) > 2.0 * MOST_LOST
     }
 
     /// The coarsest of some grids about a shape that is fine enough and holds its thin parts and gaps, or the one that was chosen.
@@ -473,7 +477,7 @@ impl<'a> Reader<'a> {
         sides: &(impl Iterator<Item = ([f64; D], [f64; D], f64)> + Clone),
     ) -> Result<Grid<D>> {
         let finest = grids.cells.len() - 1;
-        let cells = if self.is_hopeless(bounds, grids, shape, sides)? {
+        let cells = if self.is_hopeless(bounds, grids, shape, sides) {
             &grids.cells[finest..]
         } else {
             grids.cells
@@ -699,6 +703,10 @@ impl<'a> Reader<'a> {
         let box_side = grid.side();
         let within = |room: f64| box_side - 2.0 * room * self.eps_over_h * grid.spacing();
         let (most, roomy) = (within(room), within(3.0 * room));
+        if most <= 0.0 {
+            let cells = self.cells();
+            return Err(Error::NoRoom { box_side, cells });
+        }
         // On the coarsest grids there is no such room.
         let usual = if roomy > 0.0 {
             (part * box_side).min(roomy)
@@ -963,4 +971,29 @@ pub fn check_phases<const D: usize>(u: &impl PhaseField<D>, input: &str) -> Resu
         inside: if u.at([0; D]) > 0.0 { nodes } else { 0 },
         nodes,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use geometry::shapes::Ball;
+
+    use super::*;
+    use crate::events::Silent;
+
+    /// A coarser grid may do where the finest one has too many nodes, or takes more memory than most machines have.
+    #[test]
+    fn a_grid_that_is_too_large_makes_no_shape_hopeless() {
+        let ball = Ball::new([0.0; 3], 1.0).unwrap();
+        let bounds = BoundingBox::around([[-1.0; 3], [1.0; 3]]).unwrap();
+        let sides = [([1.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0)];
+        for box_side in [10.0, 7.5] {
+            let mut options = InputOptions::of("builtin:sphere");
+            options.box_side = Some(box_side);
+            let mut reader = Reader::of(&mut options, 2.0, &Silent).unwrap();
+            reader.whole = Some((DeviceKind::Flex, Flow::MeanCurvature));
+            let grids = Grids::usual(&MESH_CELLS);
+            assert!(!reader.is_hopeless(&bounds, &grids, &ball, &sides.into_iter()));
+            assert_eq!((options.cells, options.side_length), (None, None));
+        }
+    }
 }

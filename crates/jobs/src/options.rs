@@ -9,7 +9,9 @@ use crate::file::Input;
 use crate::keep;
 use crate::paths::{self, MESHES};
 use crate::prelude::*;
-use crate::values::{Amount, Ansatz, Label, SizeTarget, count, finite, positive};
+use crate::values::{
+    Amount, Ansatz, Label, SizeTarget, count, finite, positive, whole, whole_if_given,
+};
 
 const INPUT: &str = "Input";
 const GRID: &str = "Shape and grid";
@@ -37,6 +39,7 @@ pub struct InputOptions {
     /// than its voxels, if one of these grids is so fine. For `fair` of a mesh, it is the first of 128, 160 and 192 on which the parts and holes of the
     /// mesh are the same. A field keeps its own grid. Other shapes get 128 cells per unit length in 2D and 64 in 3D.
     #[arg(long, value_name = "N", help_heading = GRID)]
+    #[serde(serialize_with = "whole_if_given")]
     pub cells: Option<usize>,
 
     /// Side of the periodic box [default: 2 in 2D, 1 in 3D]
@@ -73,6 +76,7 @@ pub struct InputOptions {
     /// A file has several volumes if it is NIfTI with more than three axes, NRRD with four, MGH with several frames, or TIFF with several channels or
     /// times. In TIFF they are counted in the order of their pages.
     #[arg(long, value_name = "N", help_heading = INPUT, hide_short_help = true)]
+    #[serde(serialize_with = "whole_if_given")]
     pub frame: Option<u64>,
 
     /// Repair a mesh that is open, crosses itself, or has triangles of inconsistent orientation
@@ -192,6 +196,7 @@ pub struct CommonOptions {
 
     /// Seed of the random numbers of `check` and `train`; flows use none
     #[arg(long, default_value_t = 1, help_heading = RUN, hide_short_help = true)]
+    #[serde(serialize_with = "whole")]
     pub seed: u64,
 }
 
@@ -210,6 +215,7 @@ impl Default for CommonOptions {
 pub struct RunOptions {
     /// Make at most this many steps [default: 20, or 1000 if something else ends the run, for `mcf` 100000]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
+    #[serde(serialize_with = "whole_if_given")]
     pub steps: Option<usize>,
 
     /// Stop at this time, which is in (units of length of the input)^4
@@ -218,6 +224,7 @@ pub struct RunOptions {
 
     /// Keep a picture, the field and the shape after every N steps, and make an animation of the pictures
     #[arg(long, value_name = "N", value_parser = count, help_heading = OUTPUT)]
+    #[serde(serialize_with = "whole_if_given")]
     pub frames: Option<usize>,
 
     /// Steps between two checkpoints
@@ -229,6 +236,7 @@ pub struct RunOptions {
         help_heading = RUN,
         hide_short_help = true
     )]
+    #[serde(serialize_with = "whole")]
     pub checkpoint_every: usize,
 
     /// Axis that points up in pictures, on the page and in written meshes: x, y or z [default: depends on the input]
@@ -350,6 +358,7 @@ pub struct WillmoreOptions {
 
     /// Number of steps in which sizes go to their targets [default: 20]
     #[arg(long, value_name = "STEPS", help_heading = SIZES, hide_short_help = true)]
+    #[serde(serialize_with = "whole_if_given")]
     pub ramp: Option<usize>,
 
     /// Spontaneous curvature c0, in 1 / length [default: 0]

@@ -7,6 +7,7 @@ use engine::Helfrich;
 use pages::five_digits;
 
 use crate::faired::MeshReport;
+use crate::options::InputOptions;
 use crate::parts::{PartFate, PartReport};
 use crate::prelude::*;
 use crate::words::signed;
@@ -95,7 +96,7 @@ pub struct Summary {
     /// The Willmore energy of a surface over that of a sphere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy_over_8_pi: Option<f64>,
-    /// Whether the energy is as low as was asked for.
+    /// Whether the energy is as low as was asked for; of two options that say it, the one that is reached first counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy_reached: Option<bool>,
     /// Closed curves or surfaces.
@@ -115,6 +116,66 @@ pub struct Summary {
     /// Sizes and other measures at the end, and by how much in percent the sizes have changed.
     #[serde(flatten)]
     pub measures: BTreeMap<String, Option<f64>>,
+    /// What helps if something has gone wrong; in no file.
+    #[serde(skip)]
+    pub(crate) remedies: Remedies,
+}
+
+/// What helps a run, as its end and its input have it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Remedies {
+    /// Whether it goes on with more steps: nothing but their number ended it.
+    more_steps: bool,
+    room: Room,
+}
+
+impl Remedies {
+    /// Those of a run that this rule ended.
+    pub fn of(ended: Option<&Stop>, room: Room) -> Self {
+        Self {
+            more_steps: matches!(ended, Some(Stop::Steps(_))),
+            room,
+        }
+    }
+}
+
+/// What gives a shape room in its box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Room {
+    /// A smaller `side_length`, of what is scaled to the box.
+    #[default]
+    SideLength,
+    /// A larger `box_side`, about what has coordinates of its own.
+    BoxSide,
+    /// Another field.
+    Field,
+}
+
+impl Room {
+    /// That of an input, once its options are filled in.
+    pub fn of(options: &InputOptions) -> Self {
+        Self::given(options.side_length.is_some(), options.field_kind.is_some())
+    }
+
+    /// That of an input with these options: `side_length` is filled in where it means something, and `field_kind` of fields.
+    pub fn given(side_length: bool, field_kind: bool) -> Self {
+        match (side_length, field_kind) {
+            (true, _) => Self::SideLength,
+            (_, true) => Self::Field,
+            _ => Self::BoxSide,
+        }
+    }
+}
+
+/// A doubt, and what gives the shape room.
+macro_rules! with_room {
+    ($doubt:literal, $room:expr) => {
+        match $room {
+            Room::SideLength => concat!($doubt, "a smaller `side_length` gives it room"),
+            Room::BoxSide => concat!($doubt, "a larger `box_side` gives it room"),
+            Room::Field => concat!($doubt, "a field in a larger box gives it room"),
+        }
+    };
 }
 
 /// What controlled steps say of themselves.
@@ -237,22 +298,37 @@ impl Summary {
     pub fn doubts(&self) -> Vec<&'static str> {
         let left_behind = self.mesh.as_ref().and_then(|mesh| mesh.left_behind_percent);
         let is_new = left_behind.is_none();
+        let Remedies { more_steps, room } = self.remedies;
+        let is_scaled = room == Room::SideLength;
+        let has_swollen = self.measure("length").is_some()
+            && self
+                .measure("area_change_percent")
+                .is_some_and(|percent| percent.abs() > SWOLLEN);
+        let holds_sizes = self.command != "mcf";
         let notes = [
             (
                 left_behind.is_some_and(|percent| percent > LEFT_BEHIND),
                 "vertices could not follow the surface, which has gone further than 4 interface widths: use `remesh` for a new mesh",
             ),
             (
-                self.energy_reached == Some(false),
+                self.energy_reached == Some(false) && more_steps,
                 "the energy asked for was not reached: `willmore resume` goes on with more `steps`",
+            ),
+            (
+                self.energy_reached == Some(false) && !more_steps,
+                "the energy asked for was not reached",
             ),
             (
                 self.shortened_steps > 0,
                 "some steps were made shorter than they were to be, since the interface would have moved by more than 2 widths of it, or could not keep its sizes",
             ),
             (
-                !self.same_topology && is_new,
+                !self.same_topology && is_new && is_scaled,
                 "parts or holes have come or gone: if they should not, use more `cells` or a larger `side_length`",
+            ),
+            (
+                !self.same_topology && is_new && !is_scaled,
+                "parts or holes have come or gone: if they should not, use more `cells`",
             ),
             (
                 !self.same_topology && !is_new,
@@ -260,7 +336,7 @@ impl Summary {
             ),
             (
                 self.touches_box,
-                "the shape touches the side of the box: a smaller `side_length` gives it room",
+                with_room!("the shape touches the side of the box: ", room),
             ),
             (
                 !self.touches_box
@@ -268,7 +344,10 @@ impl Summary {
                     && self
                         .energy_over_8_pi
                         .is_some_and(|spheres| spheres < NO_SURFACE),
-                "no closed surface has so little energy: the shape is near to its own periodic image, and a smaller `side_length` gives it room",
+                with_room!(
+                    "no closed surface has so little energy: the shape is near to its own periodic image, and ",
+                    room
+                ),
             ),
             (
                 self.energy_terms.is_none()
@@ -285,11 +364,12 @@ impl Summary {
                  and more `cells` help",
             ),
             (
-                self.measure("length").is_some()
-                    && self
-                        .measure("area_change_percent")
-                        .is_some_and(|percent| percent.abs() > SWOLLEN),
+                has_swollen && holds_sizes,
                 "the enclosed area has changed by more than half, as that of thin strokes does: a shorter `time`, or `area` keep, keeps more of the shape",
+            ),
+            (
+                has_swollen && !holds_sizes,
+                "the enclosed area has changed by more than half, as that of thin strokes does: a shorter `time` keeps more of the shape",
             ),
         ];
         let holding = notes.into_iter().filter(|(holds, _)| *holds);
@@ -363,4 +443,64 @@ fn of_parts(parts: &[PartReport]) -> Vec<String> {
         text.extend(of(fate).map(|part| format!("a part, {}, {what}", part.found_at())));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Job;
+
+    /// A run of which much may have gone wrong, whether its shape touches the side of the box or is near to its image.
+    fn doubtful(command: &str, touches_box: bool, remedies: Remedies) -> Summary {
+        let grid = json!({
+            "cells": 48, "spacing": 0.04, "origin": [-1.0, -1.0], "interface_width": 0.08, "stored_cells": 2304,
+        });
+        let summary = json!({
+            "command": command, "finished": true, "steps": 1, "time": 1.0, "shortened_steps": 0, "energy_reached": false,
+            "energy_over_8_pi": 0.5, "components": 1, "same_topology": false, "touches_box": touches_box, "grid": grid,
+            "length": 1.0, "area_change_percent": -60.0,
+        });
+        Summary {
+            remedies,
+            ..serde_json::from_value(summary).unwrap()
+        }
+    }
+
+    #[test]
+    fn advice_names_options_that_the_job_has() {
+        for command in ["flow", "inpaint", "mcf"] {
+            let mut names = Vec::new();
+            for touches_box in [false, true] {
+                let doubts = doubtful(command, touches_box, Remedies::default()).doubts();
+                let doubts = doubts.into_iter();
+                names.extend(doubts.flat_map(|doubt| doubt.split('`').skip(1).step_by(2)));
+            }
+            assert!(names.contains(&"side_length") && names.contains(&"time"));
+            for name in names {
+                let value = if name == "area" { "keep" } else { "3" };
+                let named = [(name, Some(value.to_owned()))];
+                assert!(Job::of_named(command, named).is_ok(), "{command}: {name}");
+            }
+        }
+    }
+
+    #[test]
+    fn advice_is_that_for_the_end_and_the_input() {
+        let told = |ended: Option<Stop>, room: Room| {
+            let remedies = Remedies::of(ended.as_ref(), room);
+            let both = [false, true].map(|touches| doubtful("flow", touches, remedies).doubts());
+            both.concat().join("; ")
+        };
+        let said = told(Some(Stop::Steps(1)), Room::BoxSide);
+        assert_eq!(said.matches("a larger `box_side`").count(), 2, "{said}");
+        assert!(said.contains("`willmore resume`"), "{said}");
+        assert!(!said.contains("side_length"), "{said}");
+        let said = told(Some(Stop::Time(1.0)), Room::Field);
+        assert!(said.contains("asked for was not reached;"), "{said}");
+        for useless in ["resume", "box_side", "side_length"] {
+            assert!(!said.contains(useless), "{said}");
+        }
+        let said = told(None, Room::SideLength);
+        assert_eq!(said.matches("a smaller `side_length`").count(), 2, "{said}");
+    }
 }

@@ -13,7 +13,7 @@ use render::Quality;
 use report::{Axis, LineChart, Marker, Series};
 
 use crate::notes::RunNotes;
-use crate::outcome::{self, Summary};
+use crate::outcome::{self, Remedies, Room, Summary};
 use crate::parts::PartReport;
 use crate::paths::MESHES;
 use crate::prelude::*;
@@ -49,10 +49,9 @@ struct Files<'a> {
 impl Files<'_> {
     fn page(&self) -> Result<Page> {
         let about = RunNotes::of(self.run)?.about;
-        let outcome: Option<Summary> = (self.read(presentation::SUMMARY)?)
-            .map(|bytes| serde_json::from_slice(&bytes))
-            .transpose()
-            .map_err(Error::StoredOutcome)?;
+        let options: Value =
+            toml::from_str(&self.run.read_text(settings::FILE)?).map_err(Error::StoredOptions)?;
+        let outcome = self.outcome(&options)?;
         let mut page = Page::new(format!("willmore {} {}", about.command, about.name))
             .with_lead(self.lead(outcome.as_ref()));
         if let Some(shape) = self.shape()? {
@@ -65,8 +64,6 @@ impl Files<'_> {
         if !self.records.is_empty() {
             page = page.with(self.steps()?);
         }
-        let options: Value =
-            toml::from_str(&self.run.read_text(settings::FILE)?).map_err(Error::StoredOptions)?;
         let mut numbers = Section::new("Numbers");
         if let Some(outcome) = &outcome {
             let dimension = engine::dimension(self.run)?;
@@ -80,6 +77,18 @@ impl Files<'_> {
         let program =
             Section::new("Program, network and device").with(words::program(&json!(about)));
         Ok(page.with(numbers.with(options).with(program)))
+    }
+
+    /// What came out of a run with these options, if it is over.
+    fn outcome(&self, options: &Value) -> Result<Option<Summary>> {
+        let Some(bytes) = self.read(presentation::SUMMARY)? else {
+            return Ok(None);
+        };
+        let mut outcome: Summary = serde_json::from_slice(&bytes).map_err(Error::StoredOutcome)?;
+        let given = |name: &str| options.get(name).is_some();
+        let room = Room::given(given("side-length"), given("field-kind"));
+        outcome.remedies = Remedies::of(engine::ended(self.run)?.as_ref(), room);
+        Ok(Some(outcome))
     }
 
     /// The shape before, in the frames and after, in one view: drawings in the plane, surfaces to turn in space.
@@ -182,6 +191,19 @@ impl Files<'_> {
             );
         }
         let image = ImageElement::from_bytes("the plot of the steps", plot.to_svg()?.as_bytes())?;
+        let units = words::units(engine::dimension(self.run)?);
+        let caption = format!(
+            "Energy and measures of the shape at the beginning and after every step, in the units of the input: {units}."
+        );
+        let mut section = Section::new("Steps").with(figure(&image, &caption));
+        // Earlier versions took it out of a run that went on, until the next commit.
+        if self.has(METRICS) {
+            section.push(self.table_of_steps()?);
+        }
+        Ok(section)
+    }
+
+    fn table_of_steps(&self) -> Result<Section> {
         let table = TableElement::from_csv("Steps", &self.run.read_text(METRICS)?)?;
         let rows = || thinned(table.rows(), MOST_ROWS);
         let (shown, all) = (rows().count(), table.rows().len());
@@ -191,16 +213,9 @@ impl Files<'_> {
         let head = table.head().iter().map(|key| words::column(key));
         let shortened = |cell: &String| cell.parse().map_or_else(|_| cell.clone(), five_digits);
         let rows = rows().map(|row| row.iter().map(shortened));
-        let table = Section::new("Steps as a table")
+        Ok(Section::new("Steps as a table")
             .with(markdown(&note))
-            .with(TableElement::new("Steps", head, rows)?);
-        let units = words::units(engine::dimension(self.run)?);
-        let caption = format!(
-            "Energy and measures of the shape at the beginning and after every step, in the units of the input: {units}."
-        );
-        Ok(Section::new("Steps")
-            .with(figure(&image, &caption))
-            .with(table))
+            .with(TableElement::new("Steps", head, rows)?))
     }
 
     /// The values at the beginning and over the steps.

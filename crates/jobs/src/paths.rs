@@ -16,6 +16,17 @@ pub fn absolute(path: impl AsRef<Path>) -> Result<PathBuf> {
     Ok(std::path::absolute(path).map_err(files::Error::of("find", path))?)
 }
 
+/// The path of a file that may not be there yet, without links in that of its folder.
+///
+/// # Errors
+/// As [`absolute`].
+pub(crate) fn real(path: &Path) -> Result<PathBuf> {
+    let path = absolute(path)?;
+    let parts = path.parent().zip(path.file_name());
+    let found = parts.and_then(|(folder, name)| Some(folder.canonicalize().ok()?.join(name)));
+    Ok(found.unwrap_or(path))
+}
+
 /// The extension of a file in lower case.
 pub fn extension(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");

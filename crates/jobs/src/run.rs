@@ -15,7 +15,9 @@ use crate::faired::{Faired, MeshReport};
 use crate::made::{Made, Shape};
 use crate::notes::{About, NetworkNote, RunNotes};
 use crate::options::{InputOptions, RunOptions};
-use crate::outcome::{DirectReport, GridSummary, Outcome, SIZES, Summary, TimeAccuracy};
+use crate::outcome::{
+    DirectReport, GridSummary, Outcome, Remedies, Room, SIZES, Summary, TimeAccuracy,
+};
 use crate::page;
 use crate::paths::extension;
 use crate::prelude::*;
@@ -31,6 +33,8 @@ pub struct Plan<'a, const D: usize, O> {
     pub save: Option<PathBuf>,
     /// The extension of meshes, if it is not the usual one.
     pub format: Option<String>,
+    /// What gives the shape room in its box.
+    pub room: Room,
     pub watcher: &'a dyn Watcher,
 }
 
@@ -233,11 +237,13 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
         let first_energy = first.and_then(Record::energy_at_rest);
         let is_willmore = case.energy.is_willmore();
         let spheres = energy.filter(|_| D == 3 && is_willmore);
-        let target = case.stops.iter().find_map(|stop| match stop {
+        let targets = case.stops.iter().filter_map(|stop| match stop {
             Stop::Energy(target) => Some(*target),
             Stop::EnergyRatio(part) => Some(part * first_energy?),
             _ => None,
         });
+        // The first one that is reached ends the flow.
+        let target = targets.reduce(f64::max);
         Ok(Summary {
             command: self.command.to_owned(),
             finished: true,
@@ -264,6 +270,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
                 stored_cells: run.stored_cells(),
             },
             measures: measures(run),
+            remedies: Remedies::of(run.ended().as_ref(), self.room),
         })
     }
 

@@ -8,10 +8,12 @@ use crate::input::{InitialShape, Loaded, Opened, Reader};
 use crate::job::Job;
 use crate::made::{Made, Results};
 use crate::notes::RunNotes;
-use crate::options::{FairOptions, ForceOption, InputOptions, OperatorOptions, Stepper};
-use crate::outcome::Outcome;
+use crate::options::{
+    FairOptions, ForceOption, InputOptions, OperatorOptions, RunOptions, Stepper,
+};
+use crate::outcome::{Outcome, Room};
 use crate::parts::Voxels;
-use crate::paths::absolute;
+use crate::paths::{absolute, real};
 use crate::plane::Plane;
 use crate::prelude::*;
 use crate::presentation::{self, Presentation};
@@ -32,6 +34,20 @@ impl ForceOption {
         }
         if path.exists() && !self.force {
             return Err(Error::Exists(path.to_owned()));
+        }
+        Ok(())
+    }
+}
+
+impl RunOptions {
+    /// Refuses a file to save in the folder of the run: under the name of a file of the run it would damage it.
+    fn check_apart(&self, save: &Path) -> Result<()> {
+        let Some(output) = &self.output else {
+            return Ok(());
+        };
+        let folder = output.canonicalize().or_else(|_| real(output))?;
+        if real(save)?.starts_with(folder) {
+            return Err(Error::SavedInTheRun(save.to_owned()));
         }
         Ok(())
     }
@@ -189,7 +205,11 @@ pub fn resume(
     if let Some(path) = options.save.take_if(is_gone) {
         watcher.warning(&Warning::FolderGone { path });
     }
-    let session = Session::new(job, steps, None, watcher)?;
+    let session = Session::new(job, steps, None, watcher).map_err(|error| match error {
+        // There is no other name to give.
+        Error::Exists(path) => Error::ExistsByNow(path),
+        error => error,
+    })?;
     match engine::dimension(&stored)? {
         2 => session.resume::<2, Plane>(stored, more),
         _ => session.resume::<3, Space>(stored, more),
@@ -222,6 +242,7 @@ impl<'a> Session<'a> {
         let save = save.map(Path::to_owned).or(options.run.save.clone());
         if let Some(save) = &save {
             options.run.force.check(save)?;
+            options.run.check_apart(save)?;
         }
         let device = options.common.open_device()?;
         Ok(Self {
@@ -393,6 +414,7 @@ impl<'a> Session<'a> {
             options: self.job.run().clone(),
             steps: self.steps,
             save: self.save.clone(),
+            room: Room::of(self.job.input()),
             watcher: self.watcher,
         }
     }

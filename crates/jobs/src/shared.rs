@@ -180,8 +180,14 @@ impl FairOptions {
         ];
         let sizes = ["volume", "area", "reduced_volume"].into_iter().zip(sizes);
         let of_folders = ["output", "frames", "format"].into_iter().zip(of_folders);
+        let up = (
+            "up",
+            self.run.up.is_some(),
+            "which names no axis that points up",
+        );
         let given = sizes.map(|(option, given)| (option, given, keeps));
-        let mut given = given.chain(of_folders.map(|(option, given)| (option, given, alone)));
+        let given = given.chain(of_folders.map(|(option, given)| (option, given, alone)));
+        let mut given = given.chain([up]);
         match given.find(|(_, given, _)| *given) {
             Some((option, _, why)) => Err(Refusal::Shared { option, why }.into()),
             None => Ok(()),
@@ -235,23 +241,20 @@ pub fn shared_labels(mut options: FairOptions, watcher: &dyn Watcher) -> Result<
     let narrow = |&label: &i64| i32::try_from(label).map_err(|_| Refusal::LargeLabel(label));
     let names = std::iter::once(Ok(0)).chain(labels.iter().map(narrow));
     let names: Vec<i32> = names.collect::<Result<_, _>>()?;
-    let input = options.input.input.as_ref().ok_or(Error::NoInput)?;
-    let volume = input.file()?.volume(options.input.frame)?.into_owned();
-    let name = input.name().to_owned();
+    let input = options.input.input.clone().ok_or(Error::NoInput)?;
+    let file = input.file()?;
+    let mut volume = file.volume(options.input.frame)?.into_owned();
+    // Once, and not by the flow of each label.
+    volume::tell(&file, &volume.take_warnings(), watcher);
     options.input.frame = None;
     let mut flows = Vec::new();
     for &label in &labels {
-        flows.push(flow(
-            &options,
-            Input::volume(&name, volume.clone()),
-            label,
-            watcher,
-        )?);
+        let voxels = input.with_volume(volume.clone());
+        flows.push(flow(&options, voxels, label, watcher)?);
     }
     let all = if labels.len() > 1 {
-        let inside = volume.values().map(|value| u8::from(is_label(value)));
-        let mask = volume.with_values(&Values::U8(inside.collect()))?;
-        Some(flow(&options, Input::volume(&name, mask), 1, watcher)?)
+        let voxels = input.with_volume(volume.labels_as_one()?);
+        Some(flow(&options, voxels, 1, watcher)?)
     } else {
         None
     };
@@ -279,11 +282,6 @@ pub fn shared_labels(mut options: FairOptions, watcher: &dyn Watcher) -> Result<
         voxels,
         report,
     })
-}
-
-/// Whether a voxel is of another label than the background.
-fn is_label(value: f64) -> bool {
-    value.round() != 0.0
 }
 
 /// The flow of one label.

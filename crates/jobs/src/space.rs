@@ -100,10 +100,9 @@ impl Presentation<3> for Space {
         if let Some(voxels) = &self.voxels {
             return voxels.faired(u, eps, self.up).map(Some);
         }
-        // Sheets that touch each other are no surface from which another one could be far; triangles cut off what is round.
-        let volume = ZeroSet::of(start, eps)?.volume;
-        let before = surfaces::phase_field_surface(start, eps)?;
-        match ClosedMesh::new(before.with_volume(volume, |_| true)) {
+        // Sheets that touch each other are no surface from which another one could be far. Both surfaces are made alike, so that nothing but
+        // the flow tells them apart.
+        match ClosedMesh::new(surface(start, eps)?) {
             Ok((before, _)) if before.volume() > 0.0 => {
                 Ok(Some(Faired::anew(&before, surface(u, eps)?, self.up)))
             }

@@ -1,5 +1,6 @@
 //! Values of options, which are read as they are written.
 
+use std::fmt;
 use std::num::ParseIntError;
 
 use derive_more::Display;
@@ -33,6 +34,37 @@ pub fn count(text: &str) -> Result<usize, String> {
         Ok(0) => Err("it must be at least 1".to_owned()),
         parsed => parsed.map_err(|error: ParseIntError| error.to_string()),
     }
+}
+
+/// A whole number in a file of options. Those of TOML end at `2^63 - 1`: a larger one becomes a text, which is read alike.
+struct Whole<N>(N);
+
+impl<N: Copy + TryInto<i64> + fmt::Display> Serialize for Whole<N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0.try_into() {
+            Ok(number) => serializer.serialize_i64(number),
+            Err(_) => serializer.collect_str(&self.0),
+        }
+    }
+}
+
+/// For serde: a whole number.
+pub(crate) fn whole<N, S>(number: &N, serializer: S) -> Result<S::Ok, S::Error>
+where
+    N: Copy + TryInto<i64> + fmt::Display,
+    S: Serializer,
+{
+    Whole(*number).serialize(serializer)
+}
+
+/// For serde: a whole number, if there is one.
+#[expect(clippy::ref_option, reason = "serde passes the field")]
+pub(crate) fn whole_if_given<N, S>(number: &Option<N>, serializer: S) -> Result<S::Ok, S::Error>
+where
+    N: Copy + TryInto<i64> + fmt::Display,
+    S: Serializer,
+{
+    number.map(Whole).serialize(serializer)
 }
 
 /// A value in the units of the input, or a part of another one in percent.

@@ -2,7 +2,9 @@
 
 use volumes::{Body, Inside, Volume};
 
+use crate::events::Silent;
 use crate::file::File;
+use crate::input::{Reader, Source};
 use crate::options::InputOptions;
 use crate::paths::{of_text, to_text};
 use crate::prelude::*;
@@ -10,14 +12,19 @@ use crate::values::Label;
 
 const LISTED: usize = 20;
 
-pub(crate) fn body(file: &File, options: &InputOptions, watcher: &dyn Watcher) -> Result<Body> {
-    let volume = file.volume(options.frame)?;
-    for warning in volume.warnings() {
+/// Tells the warnings of the volume in a file.
+pub(crate) fn tell(file: &File, warnings: &[volumes::Warning], watcher: &dyn Watcher) {
+    for warning in warnings {
         watcher.warning(&Warning::Volume {
             path: file.path.clone(),
             warning: warning.clone(),
         });
     }
+}
+
+pub(crate) fn body(file: &File, options: &InputOptions, watcher: &dyn Watcher) -> Result<Body> {
+    let volume = file.volume(options.frame)?;
+    tell(file, volume.warnings(), watcher);
     let inside = match (options.label, options.threshold) {
         (Some(Label::One(label)), _) => Inside::Label(label as f64),
         (Some(Label::All), _) => {
@@ -56,12 +63,16 @@ fn usual(volume: &Volume, path: &Path) -> Result<Inside> {
 /// The labels of a volume but 0, of which there must be some, if all of them are to become surfaces.
 ///
 /// # Errors
-/// A file that cannot be read, or that holds no labels.
+/// An input that is no volume, a file that cannot be read, or that holds no labels.
 pub fn labels(options: &InputOptions) -> Result<Option<Vec<i64>>> {
-    let (Some(input), Some(Label::All)) = (&options.input, options.label) else {
+    if options.input.is_none() || options.label != Some(Label::All) {
         return Ok(None);
+    }
+    // No grid is made, so that the width of the interface is not asked for.
+    let source = Reader::of(&mut options.clone(), f64::NAN, &Silent)?.source;
+    let Source::Volume(file) = source else {
+        unreachable!("a label of another input was refused");
     };
-    let file = input.file()?;
     let labels = file.volume(options.frame)?.labels().unwrap_or_default();
     let labels = labels.iter().map(|(label, _)| *label as i64);
     let labels: Vec<i64> = labels.filter(|&label| label != 0).collect();

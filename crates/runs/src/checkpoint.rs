@@ -121,7 +121,7 @@ pub(crate) fn kept(finished: bool) -> usize {
 /// | bytes | content |
 /// |---|---|
 /// | 8 | magic `8f 63 6b 70 74 0d 0a 1a` |
-/// | 4 | format version, little endian: 5 |
+/// | 4 | format version, little endian: [`FORMAT`] |
 /// | … | the array of these three as CBOR (RFC 8949) |
 /// | 32 | SHA-256 of all bytes before |
 pub(crate) struct Commit {

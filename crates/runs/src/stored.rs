@@ -134,15 +134,22 @@ impl StoredRun {
         Ok((self.run, self.state))
     }
 
-    /// Goes on with a run by a commit of `state`, of the same step, after which the files that `ends` names do not belong to the
-    /// run any more; they stay until [`RunDirectory::remove_others`].
+    /// Goes on with a run by a commit of `state`, of the same step. After it the files that `ends` names do not belong to the run any
+    /// more; they stay until [`RunDirectory::remove_others`]. Those that `changes` names still do, and may be
+    /// [replaced](RunDirectory::replace_file).
     pub fn reopen(
         self,
         state: &CheckpointState<'_>,
         ends: impl Fn(&str) -> bool,
+        changes: impl Fn(&str) -> bool,
     ) -> Result<RunDirectory, Error> {
         let (mut run, _) = self.resume()?;
         run.files.retain(|name, _| !ends(name));
+        for (name, seal) in &mut run.files {
+            if changes(name) {
+                *seal = None;
+            }
+        }
         // The commits that there are give way to this one.
         let mut others = std::mem::take(&mut run.steps);
         run.commit(state)?;

@@ -249,7 +249,7 @@ fn a_finished_run_can_be_extended() {
     drop(again);
     let stored = RunDirectory::open(&run).unwrap();
     let ended = |name: &str| name == "metrics.csv";
-    let mut again = stored.reopen(&toy::state_at(3), ended).unwrap();
+    let mut again = stored.reopen(&toy::state_at(3), ended, |_| false).unwrap();
     again.replace_file("metrics.csv", b"half").unwrap();
     again.commit(&toy::state_at(6)).unwrap();
     drop(again);
@@ -270,8 +270,14 @@ fn a_finished_run_can_be_extended() {
     drop(again);
     assert_eq!(checkpoints(), 2);
     let stored = RunDirectory::open(&run).unwrap();
-    drop(stored.reopen(&toy::state_at(12), |_| false).unwrap());
+    // What may change is part of the run all the same, before anything is written.
+    let changes = |name: &str| name == "metrics.csv";
+    let reopened = stored.reopen(&toy::state_at(12), |_| false, changes);
+    drop(reopened.unwrap());
     assert_eq!(checkpoints(), 1);
+    fs::write(run.join("metrics.csv"), "changed").unwrap();
+    let stored = RunDirectory::open(&run).unwrap();
+    assert_eq!(stored.read_text("metrics.csv").unwrap(), "changed");
 }
 
 /// As it is kept for a moment by a process that is forked and has not yet become another program.

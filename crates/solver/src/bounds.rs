@@ -80,8 +80,6 @@ enum Place {
     Free,
     AtLeast,
     AtMost,
-    /// It was at a bound from which the energy pulled it, and is free.
-    Released,
 }
 
 /// The nodes that are held at their bounds: an active set.
@@ -97,21 +95,17 @@ impl Active {
         Self { bounds, places }
     }
 
-    /// Holds the nodes that are beyond their bounds, and lets those go which a gradient pulls back from them, each once. Says whether there were any.
+    /// Holds the nodes that are beyond their bounds, and lets those go which a gradient pulls back from them. Says whether there were any.
     pub(crate) fn update(&mut self, u: &[f64], gradient: Option<&[f64]>) -> bool {
         let mut changed = false;
         for node in 0..self.places.len() {
             let place = self.places[node];
             let slope = gradient.map_or(0.0, |gradient| gradient[node]);
             let next = match place {
-                Place::AtLeast if slope < 0.0 => Place::Released,
-                Place::AtMost if slope > 0.0 => Place::Released,
-                Place::Free | Place::Released if u[node] < self.bounds.least[node] - ROUNDING => {
-                    Place::AtLeast
-                }
-                Place::Free | Place::Released if u[node] > self.bounds.most[node] + ROUNDING => {
-                    Place::AtMost
-                }
+                Place::AtLeast if slope < 0.0 => Place::Free,
+                Place::AtMost if slope > 0.0 => Place::Free,
+                Place::Free if u[node] < self.bounds.least[node] - ROUNDING => Place::AtLeast,
+                Place::Free if u[node] > self.bounds.most[node] + ROUNDING => Place::AtMost,
                 same => same,
             };
             changed |= next != place;
@@ -122,7 +116,7 @@ impl Active {
 
     /// Whether no node is held.
     pub(crate) fn is_empty(&self) -> bool {
-        !(self.places.iter()).any(|place| matches!(place, Place::AtLeast | Place::AtMost))
+        self.places.iter().all(|place| *place == Place::Free)
     }
 
     /// The nodes of a region that are not held.
@@ -137,7 +131,7 @@ impl Active {
             .places
             .iter()
             .enumerate()
-            .map(|(node, place)| moves(node) && matches!(place, Place::Free | Place::Released));
+            .map(|(node, place)| moves(node) && *place == Place::Free);
         Region::marked(marks.collect(), shape, device)
     }
 

@@ -149,6 +149,13 @@ impl Constraints {
         }
     }
 
+    /// How much energy there is, with these multipliers, in what a minimization misses of the targets.
+    pub(crate) fn energy_error(&self, multipliers: [f64; 2]) -> f64 {
+        let parts = multipliers.into_iter().zip(self.targets());
+        let parts = parts.map(|(multiplier, target)| multiplier * target.unwrap_or_default());
+        ITERATES * parts.map(f64::abs).sum::<f64>()
+    }
+
     /// The targets after this part of a step from `u`, which approaches them evenly. Where `u` fulfils them, they stay.
     pub(crate) fn after<const D: usize>(
         &self,

@@ -8,6 +8,17 @@ pub fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
 }
 
+/// The next number with five digits, upwards or downwards: bounds stay bounds.
+fn outwards(number: f64, up: bool) -> f64 {
+    let near = rounded(number);
+    let beyond = if up { near >= number } else { near <= number };
+    if beyond || number == 0.0 {
+        return near;
+    }
+    let unit = 10_f64.powf(number.abs().log10().floor() - 4.0);
+    rounded(if up { near + unit } else { near - unit })
+}
+
 /// What can stop a minimization or a flow.
 #[derive(Debug, ThisError)]
 pub enum Error {
@@ -41,8 +52,16 @@ pub enum Error {
         target: f64,
     },
     #[error(
-        "the {} {} cannot enclose the {} {}: the reduced volume would be {reduced_volume:.4}, above 1; the {} has to be at least {}",
-        .names[0], rounded(*.perimeter), .names[1], rounded(*.volume), .names[0], rounded(*.least)
+        "step {step}: the sizes that are held change faster than the shape can follow, so that nothing can be told of its energy; let them reach their \
+         targets in more steps"
+    )]
+    Rushed {
+        /// Time step, counted from 1.
+        step: usize,
+    },
+    #[error(
+        "the {} {} cannot enclose the {} {}: the reduced volume would be {reduced_volume:.4}, above 1; the {} has to be larger than {}",
+        .names[0], rounded(*.perimeter), .names[1], rounded(*.volume), .names[0], outwards(*.least, true)
     )]
     PerimeterTooSmall {
         names: [&'static str; 2],
@@ -66,8 +85,30 @@ pub enum Error {
         volume: f64,
     },
     #[error(
+        "the flow cannot begin: no shape in the box with the {1} {2} has a smaller {0} than {3}, and from such a shape the two cannot be changed \
+         apart from each other; start from another shape, or hold one of the two sizes",
+        .names[0], .names[1], rounded(*.volume), rounded(*.perimeter)
+    )]
+    LeastStart {
+        names: [&'static str; 2],
+        perimeter: f64,
+        volume: f64,
+    },
+    #[error(
+        "the sizes cannot change together: after {:.0} % of the way to their targets, the {} {} could not enclose the {} {}; change the {first} in a \
+         run of its own, and the other one after it",
+        100.0 * .part, .names[0], rounded(*.perimeter), .names[1], rounded(*.volume)
+    )]
+    Way {
+        part: f64,
+        first: &'static str,
+        names: [&'static str; 2],
+        perimeter: f64,
+        volume: f64,
+    },
+    #[error(
         "the {measure} {} is too small to hold: a ball with the width {} of the interface as its radius has {}; give at least that, or more cells",
-        rounded(*.target), rounded(*.eps), rounded(*.least)
+        rounded(*.target), rounded(*.eps), outwards(*.least, true)
     )]
     SizeTooSmall {
         measure: &'static str,
@@ -78,7 +119,7 @@ pub enum Error {
     #[error(
         "the {measure} {} does not fit the box: interfaces of width {} are at least two widths apart, which leaves room for {}; give less than that, or \
          more cells",
-        rounded(*.perimeter), rounded(*.eps), rounded(*.most)
+        rounded(*.perimeter), rounded(*.eps), outwards(*.most, false)
     )]
     PerimeterTooLarge {
         measure: &'static str,
@@ -151,7 +192,9 @@ impl Error {
 
     /// The same of this time step.
     pub(crate) fn at(mut self, number: usize) -> Self {
-        if let Self::NonFinite { step, .. } | Self::NotHeld { step, .. } = &mut self {
+        if let Self::NonFinite { step, .. } | Self::NotHeld { step, .. } | Self::Rushed { step } =
+            &mut self
+        {
             *step = number;
         }
         self

@@ -9,6 +9,8 @@ use crate::{Constraints, Error};
 
 /// Balls that are measured are round to this part of their perimeter.
 const ROUND: f64 = 1e-4;
+/// Places on the way to targets where sizes are checked.
+const PLACES: usize = 256;
 
 /// A size that goes from one value to another over so many steps, evenly, and is held there. A step that is made shorter, or a substep, takes
 /// it that part of the way.
@@ -114,22 +116,65 @@ impl Held {
         self.at(f64::INFINITY)
     }
 
-    /// Refuses perimeter and volume of a ball together, or of another shape with the [least perimeter](least_perimeter) in the box. What no
-    /// shape has is refused by [`crate::Problem::hold`].
+    /// Refuses perimeter and volume of a ball together, or of another shape with the [least perimeter](least_perimeter) in the box, in the end or at the
+    /// beginning. There, what changes one of the two changes the other one in proportion. What no shape has is refused by [`crate::Problem::hold`].
+    ///
+    /// # Errors
+    /// [`Error::LeastPerimeter`], [`Error::LeastStart`].
     pub fn check<const D: usize>(&self, grid: &Grid<D>) -> Result<(), Error> {
-        let targets = self.targets();
-        match (targets.perimeter, targets.volume) {
-            (Some(perimeter), Some(volume))
-                if perimeter < (1.0 + ROUND) * least_perimeter(grid, volume) =>
-            {
-                Err(Error::LeastPerimeter {
-                    names: names::<D>(),
-                    perimeter,
-                    volume,
-                })
+        let names = names::<D>();
+        let least = |sizes: Constraints| match (sizes.perimeter, sizes.volume) {
+            (Some(perimeter), Some(volume)) => {
+                let is_least = perimeter < (1.0 + ROUND) * least_perimeter(grid, volume);
+                is_least.then_some((perimeter, volume))
             }
-            _ => Ok(()),
+            _ => None,
+        };
+        if let Some((perimeter, volume)) = least(self.targets()) {
+            return Err(Error::LeastPerimeter {
+                names,
+                perimeter,
+                volume,
+            });
         }
+        if let Some((perimeter, volume)) = least(self.at(0.0)) {
+            return Err(Error::LeastStart {
+                names,
+                perimeter,
+                volume,
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses targets that no shape of interface width `eps` has in the box, and sizes on the way to them.
+    ///
+    /// # Errors
+    /// As [`Constraints::check`] for the targets, [`Error::Way`] or [`Self::check`]'s for the way.
+    pub(crate) fn check_way<const D: usize>(&self, grid: &Grid<D>, eps: f64) -> Result<(), Error> {
+        let targets = self.targets();
+        targets.check(grid, eps)?;
+        let steps = self.steps();
+        // The way is straight but where one of the two arrives, so that few places tell enough, however many steps it takes.
+        let even = (1..PLACES).map(|place| steps as f64 * (place as f64 / PLACES as f64));
+        let arrivals = self.perimeter.iter().chain(&self.volume);
+        let mut places = even.chain(arrivals.map(|target| target.over as f64));
+        places.try_for_each(|place| match self.at(place).check(grid, eps) {
+            Err(Error::PerimeterTooSmall {
+                names,
+                perimeter,
+                volume,
+                ..
+            }) => self.check(grid).and(Err(Error::Way {
+                part: place / steps as f64,
+                // What makes the shape less round comes first.
+                first: names[usize::from(self.at(0.0).volume > targets.volume)],
+                names,
+                perimeter,
+                volume,
+            })),
+            other => other,
+        })
     }
 
     /// How many steps reach all targets.
@@ -227,6 +272,15 @@ mod tests {
         };
         assert!(band(2.0).check(&grid).is_err());
         band(2.1).check(&grid).unwrap();
+        // From a disc, nothing leads to another shape.
+        let from_disc = Held::at_reduced_volume(
+            &phase_field(grid, &disc, 2.0 * grid.spacing()).unwrap(),
+            2.0 * grid.spacing(),
+            0.8,
+            20,
+        );
+        let error = from_disc.unwrap().check(&grid).unwrap_err();
+        assert!(matches!(error, Error::LeastStart { .. }), "{error}");
         let rod = Capsule::new([-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], 0.25).unwrap();
         check_kept(&rod, 32).unwrap();
     }

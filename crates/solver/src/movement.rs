@@ -18,6 +18,8 @@ use crate::{
     bricks,
 };
 
+/// The part of the energy by which targets that are met up to a tolerance may change it.
+const TOLD: f64 = 0.1;
 /// Rounds in which nodes go to their bounds and from them.
 const ROUNDS: usize = 12;
 
@@ -201,6 +203,13 @@ impl<const D: usize> Minimizations<D> {
             return Err(Error::non_finite(step, "phase field"));
         }
         let fidelity = movement.fidelity(&*inner, &u)?;
+        let rest = newton.energy - fidelity;
+        let energy = rest.abs().max(newton.energy_before.abs());
+        if let Some(multipliers) = multipliers
+            && movement.targets.energy_error(multipliers) > TOLD * energy
+        {
+            return Err(Error::Rushed { step });
+        }
         // The energy of standing still is 2 tau w.
         let unit = problem.energy_scale() / (2.0 * movement.tau);
         let multipliers = multipliers.map(|values| values.map(|value| unit * value));
@@ -210,8 +219,7 @@ impl<const D: usize> Minimizations<D> {
             u: current.with(u),
             tension: targets.perimeter.map(|_| tension),
             pressure: targets.volume.map(|_| pressure),
-            willmore_energy: problem.energy_scale() * (newton.energy - fidelity)
-                / (2.0 * movement.tau),
+            willmore_energy: problem.energy_scale() * rest / (2.0 * movement.tau),
             newton,
             times,
         })

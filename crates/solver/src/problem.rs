@@ -167,17 +167,14 @@ impl<const D: usize> Problem<D> {
     }
 
     /// Holds these sizes from the next step on exactly: to a relative `1e-12` in double precision. A target that is not the present value is
-    /// reached in the next step, so change it slowly.
+    /// reached in the next step, so change it slowly. Where [bounds](Self::keep_within) still let nodes come and go after the last of their rounds, the
+    /// sizes are not exact.
     ///
     /// # Errors
-    /// As [`Constraints::check`](crate::Constraints::check), for the targets and for those on the way to them.
+    /// As [`Constraints::check`](crate::Constraints::check) for the targets, [`Error::Way`] and [`Error::LeastStart`] for sizes on the way to them.
     pub fn hold(&mut self, held: impl Into<Held>) -> Result<(), Error> {
         let held = held.into();
-        let eps = self.params.eps;
-        held.targets().check(&self.grid, eps)?;
-        for step in 1..=held.steps() {
-            held.at(step as f64).check(&self.grid, eps)?;
-        }
+        held.check_way(&self.grid, self.params.eps)?;
         self.held = held;
         Ok(())
     }

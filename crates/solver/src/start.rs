@@ -127,6 +127,7 @@ fn on_half_grid<const D: usize>(
     };
     let below = scheme.half.get_or_insert_default();
     let candidate = match below.step_to(half, &start, StepTo { size, targets }) {
+        Err(Error::Rushed { .. }) => return Ok(None),
         Err(error) if error.shorter_step_may_succeed() => return Ok(None),
         candidate => candidate?,
     };

@@ -170,9 +170,6 @@ impl<const D: usize> State<D> {
 
     /// The same state with the fields of this grid stored at other nodes of it.
     pub(crate) fn on(&self, nodes: &Nodes<D>) -> Result<Self, Error> {
-        if self.field.nodes() == nodes {
-            return Ok(self.clone());
-        }
         let mut carried = self.clone();
         carried.field = self.field.on(nodes)?;
         for field in carried.memory.fields.values_mut() {
@@ -271,6 +268,16 @@ mod tests {
             }
             assert_eq!(part.where_zero(&part).len(), whole.where_zero(&whole).len());
         }
+    }
+
+    /// A step that makes the bricks more leaves what it remembers on those before.
+    #[test]
+    fn what_is_remembered_follows_the_field() {
+        let ((_, few), (_, many)) = (disc(0.3), disc(0.6));
+        let mut state = State::at(many.clone());
+        state.memory.fields.insert("before".to_owned(), few);
+        let carried = state.on(many.nodes()).unwrap();
+        assert!(carried.memory.fields["before"].nodes() == many.nodes());
     }
 
     #[test]

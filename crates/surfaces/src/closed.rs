@@ -3,11 +3,11 @@
 use derive_more::Display;
 use geometry::measure::BoundingBox;
 use geometry::{Placement, require};
-use rayon::prelude::*;
 
 use crate::half_edges::HalfEdges;
 use crate::mesh::has_three_corners;
-use crate::vector::{Vector, scaled_normal, solid_angle};
+use crate::nesting::windings;
+use crate::vector::{Vector, scaled_normal};
 use crate::{Error, TriangleMesh};
 
 /// A triangle mesh that bounds a solid: every edge is run through exactly once in each direction.
@@ -391,7 +391,7 @@ fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
     let parts = seams.parts(mesh);
     let windings = windings(mesh, &parts);
     let checked = (0..parts.len()).map(|this| {
-        let winding: f64 = windings[this].iter().sum();
+        let winding: f64 = windings[this].iter().map(|part| part.number).sum();
         let outwards = mesh.volume_behind(&parts[this]) > 0.0;
         let expected = i64::from(!outwards);
         // Where components touch, the winding number is not whole and tells nothing.
@@ -407,42 +407,6 @@ fn check_nesting(mesh: &TriangleMesh, seams: &Seams) -> Result<(), Error> {
         })
     });
     checked.into_iter().collect()
-}
-
-/// For the first vertex of every part, the winding numbers of the other parts in whose box it is.
-fn windings(mesh: &TriangleMesh, parts: &[Vec<[u32; 3]>]) -> Vec<Vec<f64>> {
-    let bounds = parts.iter().map(|faces| {
-        let corners = faces.as_flattened().iter();
-        BoundingBox::around(corners.map(|&v| mesh.vertices[v as usize]))
-    });
-    let bounds: Vec<_> = bounds.collect();
-    let all = (0..parts.len()).into_par_iter().map(|this| {
-        let x = mesh.vertices[parts[this][0][0] as usize];
-        let encloses = |k: &usize| *k != this && bounds[*k].is_some_and(|b| b.contains(x));
-        let windings = (0..parts.len()).filter(encloses).map(|other| {
-            let from_x = |v| v - Vector::from_array(x);
-            let faces = parts[other].iter();
-            let seen = faces.map(|&face| solid_angle(mesh.corners(face).map(from_x)));
-            seen.sum::<f64>() / (4.0 * std::f64::consts::PI)
-        });
-        windings.collect()
-    });
-    all.collect()
-}
-
-/// How deep the parts of a surface lie in each other.
-pub(crate) struct Depths {
-    /// For every part, the number of others around it, however they are oriented.
-    pub(crate) enclosing: Vec<usize>,
-}
-
-impl Depths {
-    pub(crate) fn of(mesh: &TriangleMesh, parts: &[Vec<[u32; 3]>]) -> Self {
-        let around = |windings: &Vec<f64>| windings.iter().filter(|w| w.abs() > 0.5).count();
-        Self {
-            enclosing: windings(mesh, parts).iter().map(around).collect(),
-        }
-    }
 }
 
 /// How faces hang together.

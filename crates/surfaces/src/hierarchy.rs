@@ -175,18 +175,29 @@ impl Hierarchy {
         bounds: &BoundingBox<3>,
         holds: &mut impl FnMut(usize) -> bool,
     ) -> bool {
-        self.any_in(0, 0..self.triangles.len(), bounds, holds)
+        let touches = |own: &BoundingBox<3>| {
+            (0..3).all(|k| own.lower[k] <= bounds.upper[k] && own.upper[k] >= bounds.lower[k])
+        };
+        self.any_meeting(&touches, holds)
+    }
+
+    /// The same of something that meets a box if it meets one within.
+    pub(crate) fn any_meeting(
+        &self,
+        meets: &impl Fn(&BoundingBox<3>) -> bool,
+        holds: &mut impl FnMut(usize) -> bool,
+    ) -> bool {
+        self.any_in(0, 0..self.triangles.len(), meets, holds)
     }
 
     fn any_in(
         &self,
         node: usize,
         range: std::ops::Range<usize>,
-        bounds: &BoundingBox<3>,
+        meets: &impl Fn(&BoundingBox<3>) -> bool,
         holds: &mut impl FnMut(usize) -> bool,
     ) -> bool {
-        let own = &self.boxes[node];
-        if (0..3).any(|k| own.lower[k] > bounds.upper[k] || own.upper[k] < bounds.lower[k]) {
+        if !meets(&self.boxes[node]) {
             return false;
         }
         let first = 2 * node + 1;
@@ -194,8 +205,8 @@ impl Hierarchy {
             return range.into_iter().any(holds);
         }
         let middle = range.start.midpoint(range.end);
-        self.any_in(first, range.start..middle, bounds, holds)
-            || self.any_in(first + 1, middle..range.end, bounds, holds)
+        self.any_in(first, range.start..middle, meets, holds)
+            || self.any_in(first + 1, middle..range.end, meets, holds)
     }
 
     /// Whether a triangle is within this squared distance; the first one that is found ends the search.

@@ -75,6 +75,7 @@ mod level_set;
 mod lids;
 mod mending;
 mod mesh;
+mod nesting;
 mod noise;
 mod parts;
 mod read;

@@ -3,11 +3,12 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeBounds;
 
-use crate::closed::{Depths, Seams, drop_unreferenced, is_flat};
+use crate::closed::{Seams, drop_unreferenced, is_flat};
 use crate::crossings::touching;
 use crate::half_edges::HalfEdges;
 use crate::joined::Joined;
 use crate::mesh::{has_three_corners, key};
+use crate::nesting::enclosing;
 use crate::repair::orient;
 use crate::vector::{Vector, scaled_normal};
 use crate::{ClosedMesh, Error, Overlap, TriangleMesh, Warning};
@@ -247,12 +248,12 @@ impl Mending {
         if parts.len() < 2 {
             return;
         }
-        let depths = Depths::of(&self.mesh, &parts);
+        let enclosing = enclosing(&self.mesh, &parts);
         let (mut bodies, mut shells) = (0, 0);
-        let turned: Vec<bool> = (parts.iter().zip(&depths.enclosing))
-            .map(|(faces, &depth)| {
+        let turned: Vec<bool> = (parts.iter().zip(&enclosing))
+            .map(|(faces, around)| {
                 let inwards = self.mesh.volume_behind(faces) < 0.0;
-                let fits = inwards == (depth % 2 == 1);
+                let fits = inwards == (around.len() % 2 == 1);
                 match (fits, inwards) {
                     (true, _) => {}
                     (false, false) => bodies += 1,

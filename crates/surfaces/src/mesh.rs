@@ -178,13 +178,18 @@ impl TriangleMesh {
 
     /// Both meshes as one, the vertices and the faces of the other one behind those of this one. Normals are left out.
     pub fn beside(&self, other: &Self) -> Self {
+        let mut both = self.clone();
+        both.append(other);
+        both
+    }
+
+    /// Adds what [`Self::beside`] puts behind.
+    pub(crate) fn append(&mut self, other: &Self) {
         let first = self.vertices.len() as u32;
         let others = other.faces.iter().map(|face| face.map(|v| v + first));
-        Self {
-            vertices: [&self.vertices[..], &other.vertices].concat(),
-            faces: self.faces.iter().copied().chain(others).collect(),
-            normals: None,
-        }
+        self.vertices.extend_from_slice(&other.vertices);
+        self.faces.extend(others);
+        self.normals = None;
     }
 
     /// Keeps the given vertices, among which are those of all faces.

@@ -7,12 +7,13 @@ use std::fmt;
 use geometry::{Field, Grid, SignedDistance, Stored, optimal_profile};
 use rayon::prelude::*;
 
-use crate::closed::{Depths, Seams, drop_unreferenced};
+use crate::closed::{Seams, drop_unreferenced};
 use crate::crossings::touching;
 use crate::half_edges::HalfEdges;
 use crate::hierarchy::{Hierarchy, bounds};
 use crate::joined::Joined;
 use crate::mending::{Backs, flipped, without_doubles};
+use crate::nesting::enclosing;
 use crate::vector::{Vector, scaled_normal, solid_angle};
 use crate::{ClosedMesh, Error, MeshDistance, TriangleMesh, remeshed_surface};
 
@@ -144,11 +145,11 @@ pub fn repair(mesh: &TriangleMesh, cells: usize) -> Result<Repaired, Error> {
         let part = only(&old, &group.faces);
         if let Some((whole, holes)) = whole(&part) {
             changes.holes += holes;
-            new = new.beside(&whole);
+            new.append(&whole);
         } else if let Some((made, components)) = made_anew(&part, spacing, cells)? {
             changes.anew += 1;
             changes.united += group.bodies.saturating_sub(components);
-            new = new.beside(&made);
+            new.append(&made);
         } else {
             changes.left_out += 1;
         }
@@ -178,14 +179,19 @@ fn to_triangles(hierarchy: &Hierarchy, x: Vector) -> f64 {
     (hierarchy.nearest(x, None)).map_or(f64::INFINITY, |n| n.squared_distance.sqrt())
 }
 
-/// The mesh of some faces.
+/// The mesh of some faces, without normals.
 fn only(mesh: &TriangleMesh, faces: &[usize]) -> TriangleMesh {
-    let mut part = TriangleMesh {
-        faces: faces.iter().map(|&face| mesh.faces[face]).collect(),
-        ..mesh.clone()
-    };
-    drop_unreferenced(&mut part);
-    part
+    // Not by a copy of all vertices, since there may be many such meshes.
+    let faces = faces.iter().map(|&face| mesh.faces[face]);
+    let mut kept: Vec<u32> = faces.clone().flatten().collect();
+    kept.sort_unstable();
+    kept.dedup();
+    let number = |vertex: u32| kept.partition_point(|&other| other < vertex) as u32;
+    TriangleMesh {
+        vertices: kept.iter().map(|&v| mesh.vertices[v as usize]).collect(),
+        faces: faces.map(|face| face.map(number)).collect(),
+        normals: None,
+    }
 }
 
 /// The part with its holes closed, and how many there were, if it is a surface that does not cross itself then.
@@ -246,35 +252,68 @@ fn made_anew(
     Ok(Some((new, components)))
 }
 
+/// What becomes of a part.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    /// It is oriented outwards.
+    Body,
+    /// It is oriented inwards.
+    Cavity,
+    /// It is left out, as it is in a body already.
+    Inner,
+}
+
 /// Leaves out bodies that are inside of others, and says how many; what is inside out is turned.
 fn without_inner_bodies(mesh: &mut TriangleMesh) -> Result<usize, Error> {
     let seams = Seams::find(mesh)?;
-    let mut parts = seams.parts(mesh);
+    let parts = seams.parts(mesh);
     if parts.len() < 2 {
         return Ok(0);
     }
-    let depths = Depths::of(mesh, &parts).enclosing;
-    let all_inwards = parts
-        .iter()
-        .zip(&depths)
-        .all(|(faces, depth)| (mesh.volume_behind(faces) < 0.0) == (depth % 2 == 0));
-    let before = parts.len();
-    let mut number = 0;
-    parts.retain_mut(|faces| {
-        let is_inner = depths[number] % 2 == 1;
-        number += 1;
-        let is_inwards = (mesh.volume_behind(&*faces) < 0.0) != all_inwards;
-        // What is inwards with nothing around it is turned, and so is all of what is inside out.
-        if all_inwards || (is_inwards && !is_inner) {
-            for face in &mut *faces {
+    let enclosing = enclosing(mesh, &parts);
+    let is_inwards: Vec<bool> = (parts.iter())
+        .map(|faces| mesh.volume_behind(faces) < 0.0)
+        .collect();
+    let all_inwards = (is_inwards.iter().zip(&enclosing))
+        .all(|(inwards, around)| *inwards == (around.len() % 2 == 0));
+    // All of what is inside out is meant the other way round.
+    let meant: Vec<bool> = is_inwards.iter().map(|&is| is != all_inwards).collect();
+    let fates = fates(&meant, &enclosing);
+    mesh.faces.clear();
+    for ((mut faces, inwards), fate) in parts.into_iter().zip(is_inwards).zip(&fates) {
+        if inwards != (*fate == Fate::Cavity) {
+            for face in &mut faces {
                 face.swap(1, 2);
             }
         }
-        !is_inner || is_inwards
-    });
-    mesh.faces = parts.concat();
+        if *fate != Fate::Inner {
+            mesh.faces.extend(faces);
+        }
+    }
     drop_unreferenced(mesh);
-    Ok(before - parts.len())
+    Ok(fates.iter().filter(|fate| **fate == Fate::Inner).count())
+}
+
+/// What becomes of parts that are meant to be inwards or not, with these others around them. From the outside to the inside: what is left out
+/// encloses nothing.
+fn fates(is_inwards: &[bool], enclosing: &[Vec<usize>]) -> Vec<Fate> {
+    let mut from_outside: Vec<usize> = (0..enclosing.len()).collect();
+    from_outside.sort_by_key(|&part| enclosing[part].len());
+    let mut fates = vec![Fate::Inner; enclosing.len()];
+    for part in from_outside {
+        let layers = enclosing[part].iter().map(|&other| match fates[other] {
+            Fate::Body => 1,
+            Fate::Cavity => -1,
+            Fate::Inner => 0,
+        });
+        let is_in_body = layers.sum::<i32>() > 0;
+        fates[part] = match (is_in_body, is_inwards[part]) {
+            (false, _) => Fate::Body,
+            (true, true) => Fate::Cavity,
+            (true, false) => Fate::Inner,
+        };
+    }
+    fates
 }
 
 /// Faces that are repaired together.

@@ -266,6 +266,12 @@ fn ply_and_stl_files_keep_everything_but_positions_and_normals() {
         text,
         ascii.replace("7 0 2 5 6 0 0\n", "7 -0.5 2 5 6 0.25 0\n")
     );
+    // Rounded to the type of the file: y to double.
+    mesh.vertices[0] = [1.0 / 3.0; 3];
+    let mixed = ascii.replace("float y", "double y");
+    let text = String::from_utf8(rewrite(mixed.as_bytes(), "a.ply", &mesh).unwrap()).unwrap();
+    let rounded = "7 0.33333334 2 5 6 0.3333333333333333 0.33333334\n";
+    assert_eq!(text, mixed.replace("7 0 2 5 6 0 0\n", rounded));
     let whole = ascii.replace("float", "int");
     assert!(rewrite(whole.as_bytes(), "a.ply", &mesh).is_err());
     let stl = "solid of me\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n  endloop\n endfacet\n\

@@ -178,6 +178,36 @@ fn bodies_that_are_apart_stay_apart() {
     assert_eq!(repair(&reversed(cavity), 64).unwrap().mesh.components(), 2);
 }
 
+/// What is left out encloses nothing, however deep it lies.
+#[test]
+fn bodies_in_bodies_are_left_out_and_cavities_stay() {
+    let ball = |radius: f64| crate::common::sphere([0.0; 3], radius, 2);
+    let volume = |radius: f64| ball(radius).volume();
+    let nested = |inner: [TriangleMesh; 2]| together(together(ball(5.0), &inner[0]), &inner[1]);
+    for (mesh, components, left_out, expected) in [
+        (nested([ball(3.0), ball(1.0)]), 1, 2, volume(5.0)),
+        (
+            nested([reversed(ball(3.0)), ball(1.0)]),
+            3,
+            0,
+            volume(5.0) - volume(3.0) + volume(1.0),
+        ),
+        // A cavity in what is solid without the body between them.
+        (
+            nested([ball(3.0), reversed(ball(1.0))]),
+            2,
+            1,
+            volume(5.0) - volume(1.0),
+        ),
+    ] {
+        let repaired = repair(&mesh, 64).unwrap();
+        let found = (repaired.mesh.components(), repaired.changes.left_out);
+        assert_eq!(found, (components, left_out));
+        let ratio = repaired.mesh.volume() / expected;
+        assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+    }
+}
+
 #[test]
 fn holes_are_filled_round() {
     let open = with_hole(

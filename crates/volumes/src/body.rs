@@ -7,7 +7,7 @@ use glam::DVec3;
 use surfaces::{Cells, ClosedMesh, Filling, Parts, TriangleMesh, lattice_surface};
 
 use crate::volume::label_tolerance;
-use crate::{Error, Volume};
+use crate::{Error, Values, Volume};
 
 /// More values than this are no labels.
 const MOST_LABELS: usize = 4096;
@@ -88,6 +88,16 @@ impl Volume {
         }
         let counts = counts.into_iter();
         Some(counts.map(|(value, count)| (value as f64, count)).collect())
+    }
+
+    /// The same voxels with the value 1 for all labels but 0, and 0 for all others. Voxels that are not a number are outside, as of each label.
+    ///
+    /// # Errors
+    /// As [`Volume::with_values`].
+    pub fn labels_as_one(&self) -> Result<Self, Error> {
+        let is_labelled = |value: f64| !value.is_nan() && self.rounded(value) != 0.0;
+        let inside = self.values().map(|value| u8::from(is_labelled(value)));
+        self.with_values(&Values::U8(inside.collect()))
     }
 
     /// The least and the largest value.

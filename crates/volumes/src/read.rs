@@ -69,6 +69,7 @@ pub fn read_frame(path: impl AsRef<Path>, frame: Option<u64>) -> Result<Volume, 
         bytes: &bytes,
         beside: beside.as_deref(),
         frame,
+        room: MOST_BYTES,
     };
     contents.volume().map_err(format)
 }
@@ -84,6 +85,7 @@ pub fn decode_frame(bytes: &[u8], frame: Option<u64>) -> Result<Volume, FormatEr
         bytes,
         beside: None,
         frame,
+        room: MOST_BYTES,
     };
     contents.volume()
 }
@@ -96,6 +98,8 @@ struct Contents<'a> {
     beside: Option<&'a [u8]>,
     /// Which of several volumes.
     frame: Option<u64>,
+    /// Most bytes of voxels, if there are fewer in the file itself.
+    room: u64,
 }
 
 impl Contents<'_> {
@@ -117,7 +121,7 @@ impl Contents<'_> {
     /// Most bytes of voxels.
     fn limit(self) -> u64 {
         let data = self.beside.unwrap_or(self.bytes);
-        MOST_BYTES.max(data.len() as u64)
+        self.room.max(data.len() as u64)
     }
 
     /// A header with the voxels behind it, while they are unpacked.

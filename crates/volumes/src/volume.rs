@@ -190,6 +190,11 @@ impl Volume {
         &self.warnings
     }
 
+    /// Takes the warnings out, so that they are told once.
+    pub fn take_warnings(&mut self) -> Vec<Warning> {
+        std::mem::take(&mut self.warnings)
+    }
+
     /// Voxels along the axes.
     pub fn size(&self) -> [usize; 3] {
         self.size

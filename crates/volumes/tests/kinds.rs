@@ -174,6 +174,12 @@ fn voxels_without_a_number_are_outside() {
     let volume = decode(&header.bytes).unwrap();
     assert_eq!(volume.warnings(), [Warning::NoNumbers { count }]);
     assert_eq!(volume.labels(), Some(vec![(7.0, inside)]));
+    let one = volume.labels_as_one().unwrap();
+    assert_eq!(one.labels(), Some(vec![(0.0, count), (1.0, inside)]));
+    assert!(one.warnings().is_empty());
+    let mut told = volume.clone();
+    assert_eq!(told.take_warnings(), volume.warnings());
+    assert!(told.warnings().is_empty());
     let body = volume.body(Inside::Label(7.0)).unwrap();
     let ratio = body.surface.volume() / volume.voxel_volume() / inside as f64;
     assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");

@@ -100,7 +100,7 @@ impl<const D: usize> Willmore<D> {
     }
 
     /// A step of mean curvature flow of one's own inside, of the size `tautilde` that [`Self::scales`] says. Its calibration is
-    /// [measured](MeanCurvatureStep::calibrate) when the flow starts.
+    /// [measured](MeanCurvatureStep::calibrate) when the flow starts, unless the [formulation](Self::formulation) is the paper's, which has none.
     #[must_use]
     pub fn operator(mut self, step: impl MeanCurvatureStep<D> + 'static) -> Self {
         self.step = Some(Arc::new(step));
@@ -274,6 +274,9 @@ impl<const D: usize> Willmore<D> {
 
     fn operator_inside(&self, scales: &Scales) -> Result<Operator<D>, Error> {
         if let Some(step) = &self.step {
+            if self.formulation == Formulation::Paper {
+                return Ok(Operator::shared(step.clone(), None));
+            }
             let scales = StepScales::on(&self.grid, scales.eps, scales.mcf_step);
             let calibration = step.calibrate(&scales, &self.chosen_device()?);
             let calibration = calibration.map_err(solver::Error::Operator)?;

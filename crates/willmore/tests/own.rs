@@ -108,6 +108,21 @@ fn steps_of_own_parts_are_controlled_by_their_errors() {
     }
 }
 
+/// The paper's formulation has no calibration.
+#[test]
+fn the_formulation_holds_for_an_own_operator() {
+    let device = ComputeDevice::default_compiled().unwrap();
+    for (formulation, scheme) in [
+        (Formulation::Paper, "paper"),
+        (Formulation::Accurate, "calibrated"),
+    ] {
+        let case = allen_cahn().formulation(formulation).case(&egg()).unwrap();
+        assert_eq!(case.identity(&device)["operator"]["scheme"], scheme);
+        let is_paper = formulation == Formulation::Paper;
+        assert_eq!(case.operator.factors == Factors::PAPER, is_paper);
+    }
+}
+
 /// Euler's scheme has no estimates.
 #[test]
 fn a_scheme_without_estimates_is_not_controlled_by_them() {

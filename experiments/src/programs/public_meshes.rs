@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::meshes::folder;
 use crate::prelude::*;
-use crate::session::remove_folder;
+use crate::session::{load, remove_folder, store};
 use files::{Sha256, hexadecimal};
 use jobs::{FairOptions, Made, Refusal, Shape, Warning, Watcher};
 use runs::Interrupt;
@@ -171,13 +171,14 @@ fn program(options: &Options) -> Result<()> {
     let single = session.output.subfolder(SINGLE)?;
     let mut rows = Vec::new();
     for file in &files {
-        let stored = format!("{}.json", file.name.replace('/', "-"));
-        if let Ok(text) = std::fs::read_to_string(single.as_path().join(&stored)) {
-            rows.push(serde_json::from_str(&text)?);
+        let stored = single.path(&format!("{}.json", file.name.replace('/', "-")))?;
+        let key = file.key(options);
+        if let Some(row) = load(&stored, &key) {
+            rows.push(row);
             continue;
         }
         let row = session.phase(&file.name, |_| Ok(file.tried(options)))?;
-        single.write_json(&stored, &row)?;
+        store(&stored, &key, &row)?;
         rows.push(row);
     }
     write(&rows, &mut session)?;
@@ -274,6 +275,8 @@ fn figure(rows: &[Row]) -> Figure {
 struct Input {
     name: String,
     path: PathBuf,
+    /// The checksum of its bytes.
+    sha256: String,
     /// A folder of its own, if it was made for this run.
     _made: Option<tempfile::TempDir>,
 }
@@ -299,10 +302,12 @@ fn inputs(options: &Options) -> Result<Vec<Input>> {
             path.display()
         );
         let bytes = std::fs::read(&path).unwrap_or_default();
-        require(hexadecimal(Sha256::of(bytes)) == expected, help)?;
+        let sha256 = hexadecimal(Sha256::of(bytes));
+        require(sha256 == expected, help)?;
         inputs.push(Input {
             name: name.to_owned(),
             path,
+            sha256,
             _made: None,
         });
     }
@@ -330,6 +335,7 @@ fn quick_inputs() -> Result<Vec<Input>> {
         surfaces::write(&path, &mesh)?;
         Ok(Input {
             name: format!("{name}.ply"),
+            sha256: hexadecimal(Sha256::of(files::read(&path)?)),
             path,
             _made: Some(made),
         })
@@ -372,6 +378,15 @@ impl Watcher for Patience {
 }
 
 impl Input {
+    /// All that its row depends on.
+    fn key(&self, options: &Options) -> Value {
+        json!({
+            "sha256": self.sha256,
+            "limit_seconds": options.limit,
+            "version": env!("CARGO_PKG_VERSION"),
+        })
+    }
+
     fn tried(&self, options: &Options) -> Row {
         let mesh = surfaces::read(&self.path);
         let watcher = Patience::new(options.limit);
@@ -498,5 +513,44 @@ impl Row {
             Some(message) => message.clone(),
             None => self.warnings.join("; "),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(limit: &str) -> Options {
+        Options::parse_from(["public_meshes", "--limit", limit])
+    }
+
+    fn input(sha256: &str) -> Input {
+        Input {
+            name: "spot.obj".to_owned(),
+            path: PathBuf::from("spot.obj"),
+            sha256: sha256.to_owned(),
+            _made: None,
+        }
+    }
+
+    #[test]
+    fn a_stored_row_is_that_of_the_same_mesh_and_limit() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("spot.obj.json");
+        let row = Row {
+            name: "spot.obj".to_owned(),
+            vertices: Some(4),
+            faces: Some(4),
+            fate: Fate::Unfinished,
+            message: None,
+            warnings: Vec::new(),
+            seconds: 900.0,
+            result: None,
+            advice: None,
+        };
+        store(&file, &input("ab").key(&options("900")), &row).unwrap();
+        let found = |sha256, limit| load::<Row>(&file, &input(sha256).key(&options(limit)));
+        assert_eq!(found("ab", "900").map(|row| row.fate), Some(row.fate));
+        assert!(found("ab", "1800").is_none() && found("cd", "900").is_none());
     }
 }

@@ -1,12 +1,11 @@
 use crate::prelude::*;
-use crate::session::remove_folder;
+use crate::session::{load, remove_folder, store};
 use crate::training::{METRICS, NetworkSpec, held_out_radii, in_double_precision, quality};
 use model::Network;
 use model::training::adam::AdamParams;
 use model::training::least_squares::LeastSquaresParams;
 use model::training::levenberg_marquardt::LmParams;
 use model::training::{self, Checkpoint, CurvePoint, Trained, Training};
-use serde::de::DeserializeOwned;
 use std::time::Duration;
 
 pub const EXPERIMENT: Experiment = Experiment {
@@ -254,18 +253,6 @@ impl Trainings {
     }
 }
 
-/// What is stored in a file, if it is there, readable, and belongs to this key.
-fn load<T: DeserializeOwned>(file: &Path, key: &Value) -> Option<T> {
-    let (found, stored): (Value, T) = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
-    (found == *key).then_some(stored)
-}
-
-/// Stores something with all that it depends on, its key, whole or not at all.
-fn store(file: &Path, key: &Value, stored: &impl Serialize) -> Result<(), files::Error> {
-    let text = serde_json::to_string(&(key, stored)).map_err(std::io::Error::from);
-    files::write_atomically(file, |out| out.write_all(text?.as_bytes()))
-}
-
 impl Finished {
     fn key(&self) -> String {
         match self.recipe {
@@ -308,24 +295,4 @@ fn figure(all: &[Finished]) -> Figure {
             "Loss: mean squared nodal error on spheres not trained on. Levenberg-Marquardt uses all sampled points in each \
              iteration; an epoch of Adam is one pass over all radii in batches of 10 grids.",
         )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn checkpoints_belong_to_their_keys() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("part.json");
-        let (key, values) = (json!({ "x": 0.1 + 0.2 }), vec![1.0 / 3.0, -0.0]);
-        assert_eq!(load::<Vec<f64>>(&file, &key), None);
-        store(&file, &key, &values).unwrap();
-        let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
-        assert_eq!(load(&file, &key).map(bits), Some(bits(values)));
-        assert_eq!(load::<Vec<f64>>(&file, &json!({ "x": 0.3 })), None);
-        std::fs::write(&file, "{").unwrap();
-        assert_eq!(load::<Vec<f64>>(&file, &key), None);
-    }
 }

@@ -101,6 +101,7 @@ def metric(runs: pandas.DataFrame, wanted: dict[str, str], unit: str) -> Figure:
         return _empty("No run is finished.")
     if x is None or y is None:
         return _empty(f"No run has {wanted['x'] if x is None else wanted['y']}.")
+    runs = _filled(runs[runs[x].notna()], [name for name in (colour, panel) if name is not None], "none")
     figure, panels = _panels(runs, panel)
     places = _places(runs[x])
     for axis, part in panels:
@@ -145,13 +146,18 @@ def shapes(runs: pandas.DataFrame) -> Figure:
 
 def _with_defaults(runs: pandas.DataFrame) -> pandas.DataFrame:
     """The runs, with a word in place of options that are not given."""
-    options = [name for name in runs if name.startswith("--") and runs[name].isna().any()]
-    return runs.assign(**{name: runs[name].astype(object).where(runs[name].notna(), "default") for name in options})
+    return _filled(runs, [name for name in runs if name.startswith("--")], "default")
+
+
+def _filled(runs: pandas.DataFrame, names: list[str], word: str) -> pandas.DataFrame:
+    """The runs, with a word in place of the empty cells of these columns."""
+    with_gaps = [name for name in names if runs[name].isna().any()]
+    return runs.assign(**{name: runs[name].astype(object).where(runs[name].notna(), word) for name in with_gaps})
 
 
 def _column(runs: pandas.DataFrame, name: str | None) -> str | None:
-    """The column of a result, or of an option, which may be named without --."""
-    return next((column for column in (name, f"--{name}") if column in runs), None)
+    """The column of a result, or of an option, which may be named without --; None if all of its cells are empty."""
+    return next((column for column in (name, f"--{name}") if column in runs and runs[column].notna().any()), None)
 
 
 def _lines(runs: pandas.DataFrame, x: str) -> list[pandas.DataFrame]:

@@ -94,7 +94,7 @@ def check_config(config: Cells, path: str) -> list[str]:
     """What is wrong with the configuration."""
     expected = yaml.safe_load((SCHEMAS / "config.schema.yaml").read_text(encoding="utf-8"))
     lines = []
-    for key in sorted(set(config) - set(expected["properties"])):
+    for key in sorted(map(str, set(config) - set(expected["properties"]))):
         lines.append(f"{path}, {key}: there is no such entry{_similar(key, expected['properties'])}")
     for error in Draft202012Validator(expected).iter_errors(config):
         if error.path:
@@ -157,8 +157,10 @@ def _header(cells: list[str], place: str) -> list[str]:
 
 
 def _typed(cell: Any, column: str, rules: Cells) -> Any:
-    """The value of a text as the schema wants it; the text itself if it cannot be read as such."""
+    """The value of a text as the schema wants it; the text itself if it cannot be read as such. The program takes 64 where a table has 64.0."""
     types = rules["properties"].get(column, {}).get("type", [])
+    if isinstance(cell, float) and cell.is_integer() and "integer" in types:
+        return int(cell)
     if not isinstance(cell, str):
         return cell
     if "boolean" in types:

@@ -57,10 +57,7 @@ pub fn tell(outcome: &Outcome, console: &Console) -> Result<()> {
     }
     let shown = outcome.folder.display();
     text.push(match (&outcome.summary, &outcome.page) {
-        (None, _) => advice(
-            &outcome.folder,
-            outcome.save.as_deref().is_some_and(Path::exists),
-        ),
+        (None, _) => advice(&outcome.folder, outcome.save.as_deref()),
         (Some(_), None) => format!("results are in {shown}"),
         (Some(_), Some(page)) => {
             format!("results are in {shown}, to look at: {}", page.display())

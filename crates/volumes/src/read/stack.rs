@@ -75,14 +75,14 @@ pub(super) fn decode(contents: Contents<'_>) -> Result<Volume, FormatError> {
     let description = Description::of(&mut reader, first.element)?;
     let planes = description.planes.as_ref();
     let frame = chosen(planes, contents.frame)?;
-    let (mut bytes, mut sections) = (Vec::new(), 0);
+    let (mut bytes, mut sections) = (Vec::new(), 0_u64);
     let pages = each(&mut reader, &first, |reader, page, number| {
         if planes.is_some_and(|planes| planes.frame(number) != frame) {
             return Ok(());
         }
         sections += 1;
-        // A page more than there is, so that one alone is no reason yet.
-        let size = [first.size[0], first.size[1], sections + 1];
+        // One alone is no reason yet: others may follow.
+        let size = [first.size[0], first.size[1], sections.max(2)];
         length(size, first.element, contents.limit())?;
         page.append(reader, &mut bytes)
     })?;
@@ -199,5 +199,56 @@ impl Page {
             data[start..].iter_mut().for_each(|byte| *byte = !*byte);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tiff::encoder::colortype::Gray8;
+    use tiff::encoder::{Compression, TiffEncoder};
+
+    use super::*;
+
+    const SIDE: u32 = 64;
+    const PAGES: u8 = 4;
+    const VOXELS: u64 = 64 * 64 * 4;
+
+    /// Pages of one value each.
+    fn stack(compression: Compression) -> Vec<u8> {
+        let mut file = Cursor::new(Vec::new());
+        let encoder = TiffEncoder::new(&mut file).unwrap();
+        let mut encoder = encoder.with_compression(compression);
+        for page in 0..PAGES {
+            let pixels = vec![page; (SIDE * SIDE) as usize];
+            encoder.write_image::<Gray8>(SIDE, SIDE, &pixels).unwrap();
+        }
+        file.into_inner()
+    }
+
+    fn read(bytes: &[u8], room: u64) -> Result<Volume, FormatError> {
+        decode(Contents {
+            bytes,
+            beside: None,
+            frame: None,
+            room,
+        })
+    }
+
+    #[test]
+    fn a_stack_may_have_as_many_voxels_as_there_is_room_for() {
+        let packed = stack(Compression::Lzw);
+        assert!((packed.len() as u64) < VOXELS / 2);
+        let whole = read(&packed, VOXELS).unwrap();
+        assert_eq!(whole.size(), [64, 64, 4]);
+        assert_eq!(whole.value([63, 63, 3]) as u8, 3);
+        let refused = read(&packed, VOXELS - 1);
+        assert!(
+            matches!(refused, Err(FormatError::Size { limit, .. }) if limit == VOXELS - 1),
+            "{refused:?}"
+        );
+        // The bytes of the file itself are room enough.
+        let plain = stack(Compression::Uncompressed);
+        assert!((plain.len() as u64) < VOXELS + u64::from(SIDE * SIDE));
+        assert_eq!(read(&plain, 0).unwrap().len() as u64, VOXELS);
     }
 }

@@ -102,6 +102,7 @@ impl Encoding {
     /// The bytes of a floating-point number of this type.
     pub(super) fn bytes(self, number: Number, value: f64) -> Vec<u8> {
         let mut bytes = match (self, number) {
+            (Self::Ascii, Number::F32) => return (value as f32).to_string().into_bytes(),
             (Self::Ascii, _) => return value.to_string().into_bytes(),
             (_, Number::F32) => (value as f32).to_le_bytes().to_vec(),
             _ => value.to_le_bytes().to_vec(),
