@@ -258,7 +258,7 @@ def flow(
         The values of a field: a phase field (default), whose profile across the interface is ``tanh(-3 s / (4 eps))`` at the signed distance ``s``,
         with ``eps`` of two cells; or signed distances, negative inside, of which the package makes one.
     steps : int, optional
-        Stop after so many steps; by default 20, or 1000 where something else ends the flow.
+        Stop after so many steps; by default 20, with sizes that are held 20 more than `ramp`, or 1000 where something else ends the flow.
     time : float, optional
         Stop at this time, a length to the fourth power.
     tolerance : float or str, optional

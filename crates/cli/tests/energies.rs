@@ -192,3 +192,42 @@ fn sizes_that_change_too_fast_need_a_longer_ramp() {
     let said = text(&refused.stderr);
     assert!(said.contains("give a larger --ramp"), "{said}");
 }
+
+/// The steps of the ramp come before those that are made without targets.
+#[test]
+fn sizes_reach_their_targets_or_are_said_not_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |more: &str| {
+        let flow = format!("flow builtin:disc --cells 24 --area 90% --no-page {more}");
+        let output = program(folder.path())
+            .args(flow.trim().split(' '))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let said = run("");
+    assert!(said.contains("(-10.00 %)"), "{said}");
+    assert!(!said.contains("targets"), "{said}");
+    let said = run("--steps 3");
+    let advice = "the sizes have not reached their targets: `willmore resume` goes on";
+    assert!(said.contains(advice), "{said}");
+}
+
+/// What the grid cannot hold is said, and what has vanished has no size.
+#[test]
+fn forces_that_are_too_much_for_the_grid_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let disc = |terms: &str| {
+        let flow = format!("flow builtin:disc --cells 24 --no-page {terms}");
+        outcome(folder.path(), &flow.split(' ').collect::<Vec<_>>())
+    };
+    let lost = disc("--tension=-100 --area keep --steps 100");
+    assert!(
+        (lost["interface_slope"].as_f64().unwrap() - 1.0).abs() > 0.4,
+        "{lost}"
+    );
+    let gone = disc("--pressure 1e6");
+    assert_eq!(gone["ended"], "the shape has vanished", "{gone}");
+    assert_eq!((&gone["length"], &gone["area"]), (&0.0.into(), &0.0.into()));
+}

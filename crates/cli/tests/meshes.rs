@@ -347,3 +347,44 @@ fn a_drawing_of_stripes_is_refused_before_it_takes_long() {
     );
     assert!(clock.elapsed().as_secs() < 30);
 }
+
+/// A bound on the distance may keep the energy above a target: the flow ends where nothing moves any more.
+#[test]
+fn an_energy_out_of_reach_ends_at_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = "sample builtin:lever --cells 24 --save lever.ply";
+    outcome_text(folder.path(), sample);
+    let fair = "fair lever.ply --cells 36 --energy-ratio 0.6 --max-distance 0.01 --no-page";
+    let ended = outcome(folder.path(), &fair.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended["energy_reached"], false, "{ended}");
+    assert!(ended["steps"].as_u64().unwrap() < 100, "{ended}");
+}
+
+/// Far from the origin, single precision is coarse.
+#[test]
+fn stl_files_far_from_the_origin_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome_text(
+        folder.path(),
+        "sample builtin:sphere --cells 16 --noise 0.005 --save near.obj",
+    );
+    let near = std::fs::read_to_string(folder.path().join("near.obj")).unwrap();
+    let moved = near.lines().map(|line| match line.strip_prefix("v ") {
+        Some(rest) => {
+            let place = rest.split(' ').map(|x| x.parse::<f64>().unwrap() + 5e5);
+            let place: Vec<String> = place.map(|x| x.to_string()).collect();
+            format!("v {}\n", place.join(" "))
+        }
+        None => format!("{line}\n"),
+    });
+    std::fs::write(folder.path().join("far.obj"), moved.collect::<String>()).unwrap();
+    for (input, is_told) in [("near", false), ("far", true)] {
+        let mut command = crate::common::program(folder.path());
+        let fair =
+            format!("fair {input}.obj --cells 24 --noise 0.005 --no-page --save {input}.stl");
+        let output = command.args(fair.split(' ')).output().unwrap();
+        let said = text(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        assert_eq!(said.contains("in single precision"), is_told, "{said}");
+    }
+}

@@ -770,3 +770,39 @@ fn shapes_are_written_as_voxels_and_read_back() {
         mesh.volume()
     );
 }
+
+/// A label of eight voxels that touches no other one stays, and takes no voxels off the others.
+#[test]
+fn a_small_label_apart_leaves_the_others_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder.path().join("three.nii"), |x| {
+        let is_in_box = (0..3).all(|i| (x[i] - [18.0, 19.0, 20.0][i]).abs() <= [9.0, 6.0, 4.0][i]);
+        let is_apart = x.iter().all(|x| (4.0..6.0).contains(x));
+        match (is_in_box, is_apart) {
+            (true, _) => 1 + u8::from(x[0] > 18.0),
+            (_, true) => 7,
+            _ => 0,
+        }
+    });
+    let fair = [
+        "fair",
+        "three.nii",
+        "--label",
+        "all",
+        "--shared",
+        "--cells",
+        "40",
+    ];
+    let ended = outcome(folder.path(), &[&fair[..], &["--save", "out.nii"]].concat());
+    let labels = ended["labels"].as_array().unwrap();
+    assert_eq!(labels.len(), 3, "{ended}");
+    for label in labels {
+        let [before, after] = ["volume_before", "volume_after"].map(|name| number(label, name));
+        assert!((after / before - 1.0).abs() < 0.02, "{label}");
+        let voxels = before / SIDE.powi(3);
+        assert!(
+            (number(label, "voxels_after") - voxels).abs() <= 0.01 * voxels + 2.0,
+            "{label}"
+        );
+    }
+}

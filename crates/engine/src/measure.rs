@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use geometry::contour::ray_crossing;
-use geometry::measure::{l2_distance, perimeter, zero_set_volume};
+use geometry::measure::{has_interface, l2_distance, perimeter, zero_set_volume};
 use geometry::zero_set::reduced_volume;
 use geometry::{Field, Grid, PhaseField, ZeroSet, distance_from_phase_field};
 
@@ -42,7 +42,7 @@ impl<const D: usize> Measure<D> {
     }
 
     /// Sizes of the zero set ([`ZeroSet`]): `length` and `area` in 2D, `area` and `volume` in 3D, `reduced_volume`, and
-    /// `integrated_mean_curvature`. Where it bends too sharply for them the sizes are those of the phase field, unless some are held, and the
+    /// `integrated_mean_curvature`. Without a zero set the first is 0, and the second 0 or that of the box. Where it bends too sharply for them the sizes are those of the phase field, unless some are held, and the
     /// last is absent.
     pub fn zero_set(eps: f64, held: &Held) -> Self {
         let hold = !held.is_empty();
@@ -59,6 +59,9 @@ impl<const D: usize> Measure<D> {
         Self {
             names: names.map(str::to_owned).to_vec(),
             of: Arc::new(move |u, _| {
+                if !has_interface(u) {
+                    return Ok(vec![Some(0.0), Some(zero_set_volume(u)), None, None]);
+                }
                 let zero_set = ZeroSet::of(u, eps)?;
                 let (boundary, inside) = if hold || zero_set.sizes_hold() {
                     (zero_set.perimeter, zero_set.volume)

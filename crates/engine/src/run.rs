@@ -252,13 +252,18 @@ impl<const D: usize> Run<D> {
             steps: self.steps(),
             is_willmore: case.energy.is_willmore() && case.own.terms.is_empty(),
         };
-        let driven = !case.held.is_reached(self.state.progress);
+        let driven = !self.sizes_are_reached();
         let holds = |rule: &dyn StopRule<D>| !(driven && rule.is_rest()) && rule.holds(&progress);
         if let Some(stop) = case.stops.iter().find(|stop| holds(*stop)) {
             return Some(stop.clone());
         }
         let own = case.own.stops.iter().find(|rule| holds(&***rule))?;
         Some(Stop::Own(own.name()))
+    }
+
+    /// Whether the sizes that are held have reached their targets.
+    pub fn sizes_are_reached(&self) -> bool {
+        self.case.held.is_reached(self.state.progress)
     }
 
     /// The identity of the case, which takes all of its initial values.

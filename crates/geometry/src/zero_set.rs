@@ -43,6 +43,8 @@ pub struct ZeroSet {
     /// Standard deviation of `|grad d|` along level sets near the zero set, relative to its mean. It grows where the zero set bends or
     /// meets itself within a few spacings.
     pub spread: f64,
+    /// This mean of `|grad d|`: 1 where the profile across the zero set is the optimal one; not a number without a zero set.
+    pub slope: f64,
     /// The smallest radius of curvature at the zero set, in spacings of the grid.
     pub smallest_radius: f64,
 }
@@ -80,6 +82,7 @@ impl ZeroSet {
             mean_curvature: cell * sums.curvature,
             willmore_energy: cell * sums.energy,
             spread: sums.spread(),
+            slope: sums.slope(),
             smallest_radius: (sums.sharpest * spacing).recip(),
         }
     }
@@ -157,6 +160,11 @@ impl Sums {
         *weights += sample.weight;
         *first += sample.weight * sample.gradient;
         *second += sample.weight * sample.gradient * sample.gradient;
+    }
+
+    fn slope(&self) -> f64 {
+        let sum = |k: usize| self.layers.iter().map(|layer| layer[k]).sum::<f64>();
+        sum(1) / sum(0)
     }
 
     /// What remains after the dependence on the distance, which is that of the profile, is taken out.

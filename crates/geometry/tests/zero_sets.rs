@@ -118,6 +118,7 @@ fn what_bends_too_sharply_is_said_to() {
     let disc = measured(1.0, &Ball::new([0.003, 0.005], 0.25).unwrap());
     assert!(disc.curvatures_hold(), "{disc:?}");
     assert!((disc.smallest_radius - 16.0).abs() < 0.6, "{disc:?}");
+    assert!((disc.slope - 1.0).abs() < 0.01, "{disc:?}");
     // Sizes hold for longer than curvatures.
     let small = measured(1.0, &Ball::new([0.003, 0.005], 0.1).unwrap());
     assert!(small.sizes_hold() && !small.curvatures_hold(), "{small:?}");
@@ -128,6 +129,7 @@ fn what_bends_too_sharply_is_said_to() {
     let near = |x: f64| Ball::new([x, 0.0], 0.15).unwrap();
     let contact = measured(1.0, &near(-0.17).union(near(0.17)));
     for shape in [corners, edges, sheet, contact] {
+        assert!((shape.slope - 1.0).abs() < 0.2, "{shape:?}");
         assert!(!shape.sizes_hold() && !shape.curvatures_hold(), "{shape:?}");
     }
 }

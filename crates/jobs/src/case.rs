@@ -23,6 +23,8 @@ const INPAINT_STEP: f64 = 16.0;
 const INPAINT_HALVINGS: u32 = 12;
 /// Steps over which sizes go to their targets.
 const RAMP: usize = 20;
+/// The largest spontaneous curvature in one over interface widths: that of a cylinder whose radius is two of them.
+const SHARPEST: f64 = 0.5;
 
 /// Refuses widths of the interface, in cells, that no grid resolves.
 ///
@@ -118,13 +120,18 @@ impl Job {
             .is_some_and(|options| options.stepper == Some(Stepper::Direct))
     }
 
-    /// How many steps are made unless it is said: few, or many where something else ends the run; those of mean curvature flow are short.
+    /// How many steps are made unless it is said: few after sizes have reached their targets, or many where something else ends the run; those of mean
+    /// curvature flow are short.
     pub(crate) fn usual_steps(&mut self) -> usize {
         let fairs = matches!(self, Self::Fair(fair) if fair.takes_small_steps());
         let energy = self.willmore().and_then(|options| options.energy);
         let has_an_end = fairs || energy.is_some() || self.run().time.is_some();
         match self {
-            _ if !has_an_end => 20,
+            _ if !has_an_end => {
+                20 + self
+                    .willmore()
+                    .map_or(0, |options| options.steps_of_sizes())
+            }
             Self::Mcf(_) => 100_000,
             _ => 1000,
         }
@@ -137,7 +144,11 @@ impl Job {
         stops.extend(self.run().time.map(Stop::Time));
         let energy = self.willmore().and_then(|options| options.energy);
         stops.extend(energy.map(Stop::Energy));
-        if matches!(rule, StepRule::ByEnergy(_) | StepRule::Controlled) {
+        // Steps of these rules become long where the energy hardly falls.
+        if matches!(
+            rule,
+            StepRule::ByEnergy(_) | StepRule::Controlled | StepRule::Graded { .. }
+        ) {
             stops.push(Stop::EnergyAtRest);
         }
         if let Self::Fair(fair) = self {
@@ -197,9 +208,7 @@ impl Job {
         let known = start.presentation.known(&start.initial, eps)?;
         let (mut energy, mut held) = (Helfrich::default(), Held::default());
         if let Some(options) = options {
-            energy.spontaneous_curvature = options.spontaneous_curvature.unwrap_or(0.0);
-            energy.tension = options.tension.unwrap_or(0.0);
-            energy.pressure = options.pressure.unwrap_or(0.0);
+            energy = options.energy::<D>(eps)?;
             held = options.held(&start.initial, eps, known.volume)?;
         }
         let mut measures = vec![Measure::zero_set(eps, &held)];
@@ -252,6 +261,56 @@ impl WillmoreOptions {
             watcher.note(&Note::AreaInThePlane);
         }
         Ok(())
+    }
+
+    /// The steps in which sizes go to their targets. Where edges become round, a size that is kept does so, too.
+    fn steps_of_sizes(&self) -> usize {
+        let goes = self.length.is_some()
+            || self.area.is_some()
+            || self.reduced_volume.is_some()
+            || matches!(self.volume, Some(SizeTarget::To(_)));
+        if goes { self.ramp.unwrap_or(RAMP) } else { 0 }
+    }
+
+    /// The energy besides bending. A term of a size that is held would change nothing but errors of the grid.
+    ///
+    /// # Errors
+    /// [`Refusal::NoEffect`] for such a term, [`Refusal::SharpCurvature`] for a spontaneous curvature that no interface of width `eps` can have.
+    fn energy<const D: usize>(&self, eps: f64) -> Result<Helfrich> {
+        let SizeTargets { perimeter, volume } = self.size_targets::<D>();
+        let is_kept = self.reduced_volume.is_some();
+        let [boundary, inside] = match D {
+            2 => ["length", "area"],
+            _ => ["area", "volume"],
+        };
+        for (option, value, is_held, size) in [
+            (
+                "tension",
+                self.tension,
+                perimeter.is_some() || is_kept,
+                boundary,
+            ),
+            (
+                "pressure",
+                self.pressure,
+                volume.is_some() || is_kept,
+                inside,
+            ),
+        ] {
+            if is_held && value.is_some_and(|value| value != 0.0) {
+                return Err(Refusal::NoEffect { option, size }.into());
+            }
+        }
+        let energy = Helfrich {
+            spontaneous_curvature: self.spontaneous_curvature.unwrap_or(0.0),
+            tension: self.tension.unwrap_or(0.0),
+            pressure: self.pressure.unwrap_or(0.0),
+        };
+        let curvature = energy.spontaneous_curvature;
+        if curvature.abs() * eps > SHARPEST {
+            return Err(Refusal::SharpCurvature { curvature, eps }.into());
+        }
+        Ok(energy)
     }
 
     /// The sizes that are held, from what they are at the beginning; `of_input` is the volume of the input, if the grid does not say it.

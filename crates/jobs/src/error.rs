@@ -319,7 +319,11 @@ impl From<engine::Error> for Error {
             {
                 Self::Hurried(error)
             }
-            engine::Error::TooStiff { .. } => Self::TooStiff(error),
+            engine::Error::TooStiff { source, .. }
+                if !matches!(**source, solver::Error::NonFinite { .. }) =>
+            {
+                Self::TooStiff(error)
+            }
             _ => Self::Engine(error),
         }
     }

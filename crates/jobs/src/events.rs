@@ -158,6 +158,13 @@ pub enum Warning {
         /// The file.
         path: PathBuf,
     },
+    /// A file of single precision holds a mesh that is far from the origin.
+    SinglePrecision {
+        /// The file.
+        path: PathBuf,
+        /// The rounding of coordinates over the mean length of edges.
+        part: f64,
+    },
     /// The folder of the file to save is gone.
     FolderGone {
         /// The file.
@@ -315,6 +322,15 @@ impl fmt::Display for Warning {
                 "{} has more than 8 bits for a tone; the repaired image has 8",
                 path.display()
             ),
+            Self::SinglePrecision { path, part } => {
+                write!(
+                    f,
+                    "{}: coordinates of STL files are in single precision, which rounds these by up to {:.1} % of an edge: save .ply, .obj or .off, or \
+                     move the mesh to the origin",
+                    path.display(),
+                    100.0 * part
+                )
+            }
             Self::FolderGone { path } => {
                 write!(
                     f,

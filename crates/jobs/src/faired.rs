@@ -78,6 +78,9 @@ pub struct MeshReport {
     /// The change of the volume, in percent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_change_percent: Option<f64>,
+    /// By how much the volume differs from that which was asked for, in percent, if that is more than a thousandth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume_missed_percent: Option<f64>,
     /// The change of the area, in percent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area_change_percent: Option<f64>,

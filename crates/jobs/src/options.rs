@@ -213,7 +213,7 @@ impl Default for CommonOptions {
 #[derive(Args, Serialize, Clone, Debug)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// Make at most this many steps [default: 20, or 1000 if something else ends the run, for `mcf` 100000]
+    /// Make at most this many steps [default: 20, with sizes that are held 20 more than --ramp, or 1000 if something else ends the run, for `mcf` 100000]
     #[arg(long, value_name = "COUNT", value_parser = count, help_heading = FLOW)]
     #[serde(serialize_with = "whole_if_given")]
     pub steps: Option<usize>,

@@ -21,6 +21,8 @@ const NO_SURFACE: f64 = 0.95;
 const UNRESOLVED: f64 = 0.995;
 /// A change of the area, in percent, that is more than what makes a drawing smooth.
 const SWOLLEN: f64 = 50.0;
+/// An interface whose slope is off by more than this part is none any more.
+const LOST: f64 = 0.4;
 /// More than this part of the vertices, in percent, that could not follow is told.
 const LEFT_BEHIND: f64 = 1.0;
 
@@ -99,6 +101,12 @@ pub struct Summary {
     /// Whether the energy is as low as was asked for; of two options that say it, the one that is reached first counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy_reached: Option<bool>,
+    /// Whether the sizes that are held have reached their targets, if they were to change.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sizes_reached: Option<bool>,
+    /// How steep the interface is at the end: 1 with the optimal profile, [`ZeroSet::slope`]. A shape that has vanished has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface_slope: Option<f64>,
     /// Closed curves or surfaces.
     pub components: usize,
     /// Of all surfaces together.
@@ -126,14 +134,18 @@ pub struct Summary {
 pub struct Remedies {
     /// Whether it goes on with more steps: nothing but their number ended it.
     more_steps: bool,
+    /// Whether it has not come to the time that was asked for.
+    is_early: bool,
     room: Room,
 }
 
 impl Remedies {
-    /// Those of a run that this rule ended.
-    pub fn of(ended: Option<&Stop>, room: Room) -> Self {
+    /// Those of a run that this rule ended, and that was to end at a time or not.
+    pub fn of(ended: Option<&Stop>, has_end_time: bool, room: Room) -> Self {
+        let more_steps = matches!(ended, Some(Stop::Steps(_)));
         Self {
-            more_steps: matches!(ended, Some(Stop::Steps(_))),
+            more_steps,
+            is_early: more_steps && has_end_time,
             room,
         }
     }
@@ -298,7 +310,15 @@ impl Summary {
     pub fn doubts(&self) -> Vec<&'static str> {
         let left_behind = self.mesh.as_ref().and_then(|mesh| mesh.left_behind_percent);
         let is_new = left_behind.is_none();
-        let Remedies { more_steps, room } = self.remedies;
+        let misses_volume =
+            (self.mesh.as_ref()).is_some_and(|mesh| mesh.volume_missed_percent.is_some());
+        let Remedies {
+            more_steps,
+            is_early,
+            room,
+        } = self.remedies;
+        let has_lost_profile =
+            (self.interface_slope).is_some_and(|slope| (slope - 1.0).abs() > LOST);
         let is_scaled = room == Room::SideLength;
         let has_swollen = self.measure("length").is_some()
             && self
@@ -311,12 +331,33 @@ impl Summary {
                 "vertices could not follow the surface, which has gone further than 4 interface widths: use `remesh` for a new mesh",
             ),
             (
+                misses_volume,
+                "the mesh does not have the volume that it was to have, since vertices went back where faces would cross: `remesh` makes a new mesh",
+            ),
+            (
                 self.energy_reached == Some(false) && more_steps,
                 "the energy asked for was not reached: `willmore resume` goes on with more `steps`",
             ),
             (
                 self.energy_reached == Some(false) && !more_steps,
                 "the energy asked for was not reached",
+            ),
+            (
+                is_early,
+                "the time asked for was not reached: `willmore resume` goes on with more `steps`",
+            ),
+            (
+                self.sizes_reached == Some(false) && more_steps,
+                "the sizes have not reached their targets: `willmore resume` goes on with more `steps`",
+            ),
+            (
+                self.sizes_reached == Some(false) && !more_steps,
+                "the sizes have not reached their targets",
+            ),
+            (
+                has_lost_profile,
+                "the interface has lost its profile, so that sizes and energy say nothing: the shape has details, or the energy has terms, that are too much for \
+                 the grid, and more `cells` help",
             ),
             (
                 self.shortened_steps > 0,
@@ -487,13 +528,14 @@ mod tests {
     #[test]
     fn advice_is_that_for_the_end_and_the_input() {
         let told = |ended: Option<Stop>, room: Room| {
-            let remedies = Remedies::of(ended.as_ref(), room);
+            let remedies = Remedies::of(ended.as_ref(), true, room);
             let both = [false, true].map(|touches| doubtful("flow", touches, remedies).doubts());
             both.concat().join("; ")
         };
         let said = told(Some(Stop::Steps(1)), Room::BoxSide);
         assert_eq!(said.matches("a larger `box_side`").count(), 2, "{said}");
         assert!(said.contains("`willmore resume`"), "{said}");
+        assert!(said.contains("the time asked for"), "{said}");
         assert!(!said.contains("side_length"), "{said}");
         let said = told(Some(Stop::Time(1.0)), Room::Field);
         assert!(said.contains("asked for was not reached;"), "{said}");

@@ -21,6 +21,8 @@ pub const INPUT: &str = "input";
 const RINGS: usize = 4;
 /// Of a mesh with thin parts at least this part of the vertices moves.
 const FEWEST_MOVING: f64 = 0.1;
+/// A volume that is off by more than this, in percent, is told.
+const MISSED: f64 = 0.1;
 
 /// A mesh of which everything but the positions of its vertices stays: see [`Fairing`].
 #[derive(Default, Serialize, Deserialize)]
@@ -615,9 +617,15 @@ impl OwnMesh {
             kept_edges_length: (edges.count > 0).then_some(edges.length),
             ..MeshReport::new(rough, &moved, &lengths)
         };
+        let after =
+            (report.volume_change_percent).map(|percent| (1.0 + 0.01 * percent) * rough.volume());
+        report.volume_missed_percent = (volume.zip(after))
+            .map(|(wanted, found)| 100.0 * (found / wanted - 1.0))
+            .filter(|percent| percent.abs() > MISSED);
         if open.is_some_and(|open| !open.rim.is_empty()) {
             // What lids enclose is no size of the surface.
             (report.volume_change_percent, report.area_change_percent) = (None, None);
+            report.volume_missed_percent = None;
             report.is_open = true;
         }
         if let Some(length) = self.max_distance {

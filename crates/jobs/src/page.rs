@@ -87,7 +87,7 @@ impl Files<'_> {
         let mut outcome: Summary = serde_json::from_slice(&bytes).map_err(Error::StoredOutcome)?;
         let given = |name: &str| options.get(name).is_some();
         let room = Room::given(given("side-length"), given("field-kind"));
-        outcome.remedies = Remedies::of(engine::ended(self.run)?.as_ref(), room);
+        outcome.remedies = Remedies::of(engine::ended(self.run)?.as_ref(), given("time"), room);
         Ok(Some(outcome))
     }
 

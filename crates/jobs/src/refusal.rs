@@ -43,6 +43,27 @@ pub enum Refusal {
     /// Two words for the area in the plane.
     #[error("in the plane `volume` is another word for `area`: give one of them")]
     AreaAndVolume,
+    /// A term of the energy, of a size that is held.
+    #[error(
+        "`{option}` has no effect where the {size} is held: leave it out, or let the {size} be free"
+    )]
+    NoEffect {
+        /// The option.
+        option: &'static str,
+        /// The size.
+        size: &'static str,
+    },
+    /// A spontaneous curvature whose radius is smaller than the grid resolves.
+    #[error(
+        "`spontaneous_curvature` {curvature} has the radius {}, and interfaces are {} wide, of which it has to be two: give a smaller one, or more `cells`",
+        solver::rounded(1.0 / curvature.abs()), solver::rounded(*eps)
+    )]
+    SharpCurvature {
+        /// The curvature.
+        curvature: f64,
+        /// The width of the interface.
+        eps: f64,
+    },
     /// Both sizes of a shape with edges that cannot be made round.
     #[error(
         "{boundary} and {inside} cannot both be held: the grid does not resolve parts of the shape, and so their {boundary}; give more \

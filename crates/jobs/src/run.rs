@@ -242,6 +242,8 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             Stop::EnergyRatio(part) => Some(part * first_energy?),
             _ => None,
         });
+        let slope = ZeroSet::of(u, eps)?.slope;
+        let has_end_time = self.options.time.is_some();
         // The first one that is reached ends the flow.
         let target = targets.reduce(f64::max);
         Ok(Summary {
@@ -257,6 +259,8 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             energy_terms: energy.filter(|_| !is_willmore).map(|_| case.energy),
             energy_over_8_pi: spheres.map(|energy| energy / (8.0 * PI)),
             energy_reached: target.map(|target| energy.is_some_and(|energy| energy <= target)),
+            sizes_reached: (case.held.steps() > 0).then(|| run.sizes_are_reached()),
+            interface_slope: slope.is_finite().then_some(slope),
             components: topology.components,
             euler_characteristic: topology.euler_characteristic,
             same_topology: topology == before,
@@ -270,7 +274,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
                 stored_cells: run.stored_cells(),
             },
             measures: measures(run),
-            remedies: Remedies::of(run.ended().as_ref(), self.room),
+            remedies: Remedies::of(run.ended().as_ref(), has_end_time, self.room),
         })
     }
 
@@ -327,7 +331,22 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             Some(faired) => faired.surface.encode(&format)?,
             None => self.presentation.encode(u, eps, &format)?,
         };
+        if format == "stl" {
+            warn_of_single_precision(&bytes, path, self.watcher);
+        }
         Ok(files::write_atomically(path, |out| out.write_all(&bytes))?)
+    }
+}
+
+/// Warns if the coordinates of an STL file, which are in single precision, are rounded by much for its triangles.
+fn warn_of_single_precision(bytes: &[u8], path: &Path, watcher: &dyn Watcher) {
+    /// The part of an edge that is told.
+    const MUCH: f64 = 1e-3;
+    // What cannot be read again has no edges any more.
+    let part = surfaces::decode(bytes, path).map_or(1.0, |mesh| mesh.single_rounding());
+    if part > MUCH {
+        let path = path.to_owned();
+        watcher.warning(&Warning::SinglePrecision { path, part });
     }
 }
 

@@ -26,7 +26,7 @@ const MOST_NODES: f64 = 1e9;
 /// Rounds in which a length for each label is found that is added to its depths, so that the volumes are right.
 const OFFSETS: usize = 4;
 /// The same for the counts of voxels, which are whole numbers.
-const COUNTS: usize = 8;
+const COUNTS: usize = 12;
 /// The rounds end when the walls move by less than this part of a voxel.
 const ENOUGH: f64 = 0.002;
 /// Rounds that make triangles of walls better.
@@ -284,6 +284,15 @@ pub fn shared_labels(mut options: FairOptions, watcher: &dyn Watcher) -> Result<
     })
 }
 
+/// The number of labels that nothing is left of, and the sum of the squares of what labels lack or have too much over what they should have. So a voxel
+/// of a small label, and some of a large one, count alike.
+fn wrong_part(missing: &[f64], wanted: &[f64]) -> [f64; 2] {
+    let labels = missing.iter().zip(wanted).skip(1);
+    let gone = labels.clone().filter(|(missing, all)| missing >= all);
+    let squares = labels.map(|(missing, all)| missing * missing / all);
+    [gone.count() as f64, squares.sum()]
+}
+
 /// The flow of one label.
 fn flow(options: &FairOptions, input: Input, label: i64, watcher: &dyn Watcher) -> Result<Flowed> {
     if watcher.interrupt()?.requested() {
@@ -386,7 +395,8 @@ impl Sharing {
         walls: &LabelMesh,
     ) -> Result<(Volume, Vec<usize>)> {
         let offsets = self.depths.offsets.clone();
-        let (mut best, mut least) = (Vec::new(), f64::INFINITY);
+        let (mut best, mut least) = (Vec::new(), [f64::INFINITY; 2]);
+        let (mut from, mut part) = ((offsets.clone(), Vec::new()), 1.0);
         for _ in 0..COUNTS {
             let labels = self.in_voxels(volume);
             let counts = counted(&labels, names.len());
@@ -394,13 +404,17 @@ impl Sharing {
             let missing =
                 counts.map(|(&count, wanted)| wanted - count as f64 * volume.voxel_volume());
             let missing: Vec<f64> = std::iter::once(0.0).chain(missing).collect();
-            let wrong = missing.iter().zip(&self.volumes).skip(1);
-            let wrong = wrong
-                .map(|(missing, all)| (missing / all).abs())
-                .fold(0.0, f64::max);
+            let wrong = wrong_part(&missing, &self.volumes);
             if wrong < least {
-                (best, least) = (labels, wrong);
+                (best, least, part) = (labels, wrong, 1.0);
+                from = (self.depths.offsets.clone(), missing);
+            } else {
+                // Counts go in steps, for which all that is missing may be too much.
+                part *= 0.5;
             }
+            let (offsets, missing) = &from;
+            let missing = missing.iter().map(|missing| part * missing).collect();
+            self.depths.offsets.clone_from(offsets);
             self.grow(walls, missing);
         }
         self.depths.offsets = offsets;

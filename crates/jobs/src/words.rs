@@ -187,7 +187,7 @@ const SPACE: [(&str, &str); 8] = [
     ),
 ];
 
-const NUMBERS: [(&str, &str); 28] = [
+const NUMBERS: [(&str, &str); 31] = [
     (
         "/energy_terms/spontaneous_curvature",
         "Spontaneous curvature in the energy, in one over units of the input",
@@ -203,6 +203,14 @@ const NUMBERS: [(&str, &str); 28] = [
     (
         "/energy_reached",
         "Was the energy reached that was asked for?",
+    ),
+    (
+        "/sizes_reached",
+        "Have the sizes that are held reached their targets?",
+    ),
+    (
+        "/interface_slope",
+        "How steep the interface is at the end, which is 1 with the optimal profile",
     ),
     (
         "/reduced_volume",
@@ -271,6 +279,10 @@ const NUMBERS: [(&str, &str); 28] = [
     (
         "/mesh/volume_change_percent",
         "Change of the volume of the mesh, in percent",
+    ),
+    (
+        "/mesh/volume_missed_percent",
+        "Difference of this volume from that which was asked for, in percent",
     ),
     (
         "/mesh/left_behind_percent",

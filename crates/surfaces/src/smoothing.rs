@@ -330,6 +330,13 @@ impl TriangleMesh {
         edges.sum::<f64>() / (3 * self.faces.len()).max(1) as f64
     }
 
+    /// By how much single precision, as in STL files, rounds the largest coordinate at most, over the mean length of the edges.
+    pub fn single_rounding(&self) -> f64 {
+        let coordinates = self.vertices.as_flattened().iter();
+        let largest = coordinates.fold(0.0, |most: f64, x| most.max(x.abs()));
+        0.5 * f64::from(f32::EPSILON) * largest / self.mean_edge()
+    }
+
     pub(crate) fn moved_by(&self, offset: &[Vector]) -> Self {
         let pairs = self.points().into_iter().zip(offset);
         self.on(&pairs.map(|(x, &by)| x + by).collect::<Vec<_>>())

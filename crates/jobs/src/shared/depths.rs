@@ -9,6 +9,8 @@ use crate::session::Flowed;
 
 /// Beyond so many cells from its surface, a distance is that of the nearest node.
 const FAR: f64 = 4.0;
+/// Labels whose voxels are so far from all labels as one, in voxels, are no part of it.
+const APART: f64 = 0.25;
 
 /// A smooth label: the zero level set of its flow, with the parts that did not flow.
 struct Smooth {
@@ -89,22 +91,35 @@ impl Smooth {
 
 /// All labels of a segmentation, each as deep as it is smooth, and moved by a length of its own.
 ///
-/// The background is what is outside of all labels together, so that the edge at which two labels meet it does not become a groove. Elsewhere a
-/// point belongs to the label in which it is deepest.
+/// The background is what is outside of all labels together and of those that are apart, so that the edge at which two labels meet it does not become
+/// a groove. Elsewhere a point belongs to the label in which it is deepest.
 pub struct Depths {
     labels: Vec<Smooth>,
     /// All labels as one, if there are several.
     all: Option<Smooth>,
+    /// Labels that are apart from it, since they are so small that it has no part for them.
+    alone: Vec<usize>,
     /// What is added to the depth of each label; the first is that of the background, which stays 0.
     pub offsets: Vec<f64>,
 }
 
 impl Depths {
     pub fn new(labels: &[Flowed], all: Option<&Flowed>) -> Result<Self> {
+        let all = all.map(Smooth::of).transpose()?;
+        let is_apart = |flowed: &Flowed, all: &Smooth| {
+            let surface = flowed.voxels.surface().mesh();
+            let mut vertices = surface.vertices.iter();
+            vertices.all(|&x| all.at(x).0 < -APART * flowed.voxels.side)
+        };
+        let alone = all.iter().flat_map(|all| {
+            let numbers = 0..labels.len();
+            numbers.filter(|&number| is_apart(&labels[number], all))
+        });
         Ok(Self {
             offsets: vec![0.0; labels.len() + 1],
+            alone: alone.collect(),
             labels: labels.iter().map(Smooth::of).collect::<Result<_>>()?,
-            all: all.map(Smooth::of).transpose()?,
+            all,
         })
     }
 
@@ -112,13 +127,27 @@ impl Depths {
         self.all.as_ref().unwrap_or(&self.labels[0])
     }
 
+    /// The labels apart in whose grids a point is.
+    fn alone(&self, x: [f64; 3]) -> impl Iterator<Item = &Smooth> {
+        let labels = self.alone.iter().map(|&number| &self.labels[number]);
+        labels.filter(move |label| label.contains(x))
+    }
+
+    /// The depth in all labels together, with its gradient.
+    fn in_all(&self, x: [f64; 3]) -> (f64, [f64; 3]) {
+        let deepest = self.all().at(x);
+        self.alone(x)
+            .map(|label| label.at(x))
+            .fold(deepest, |a, b| if b.0 > a.0 { b } else { a })
+    }
+
     /// By how much a point is deeper in the first of two labels than in the second, with the gradient. The wall between them moves by half of the
     /// difference of what is added to their depths, also that of the background.
     pub fn between(&self, [a, b]: [u32; 2], x: [f64; 3]) -> (f64, [f64; 3]) {
         let added = self.offsets[a as usize] - self.offsets[b as usize];
         let ((depth, slope), factor) = match [a, b] {
-            [BACKGROUND, _] => (self.all().at(x), -2.0),
-            [_, BACKGROUND] => (self.all().at(x), 2.0),
+            [BACKGROUND, _] => (self.in_all(x), -2.0),
+            [_, BACKGROUND] => (self.in_all(x), 2.0),
             [a, b] => {
                 let [(a, slope_a), (b, slope_b)] =
                     [a, b].map(|l| self.labels[l as usize - 1].at(x));
@@ -131,7 +160,8 @@ impl Depths {
 
     /// The label of a point.
     pub fn label(&self, x: [f64; 3]) -> u32 {
-        let depth = 2.0 * self.all().depth(x);
+        let alone = self.alone(x).map(|label| label.depth(x));
+        let depth = 2.0 * alone.fold(self.all().depth(x), f64::max);
         let far = self.all().distance.grid().spacing();
         if depth < -FAR * far {
             return BACKGROUND;
