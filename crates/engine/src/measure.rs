@@ -42,8 +42,8 @@ impl<const D: usize> Measure<D> {
     }
 
     /// Sizes of the zero set ([`ZeroSet`]): `length` and `area` in 2D, `area` and `volume` in 3D, `reduced_volume`, and
-    /// `integrated_mean_curvature`. Without a zero set the first is 0, and the second 0 or that of the box. Where it bends too sharply for them the sizes are those of the phase field, unless some are held, and the
-    /// last is absent.
+    /// `integrated_mean_curvature`. Without a zero set the first is 0, and the second 0 or that of the box. Where it bends too sharply for them the
+    /// sizes are those of the phase field, unless some are held, and the last is absent.
     pub fn zero_set(eps: f64, held: &Held) -> Self {
         let hold = !held.is_empty();
         let [boundary, inside] = match D {
