@@ -6,7 +6,7 @@ use geometry::shapes::{Ball, Ellipse};
 use geometry::{Field, Grid, SignedDistance, npy, phase_field};
 use serde_json::Value;
 
-use crate::common::{column, outcome};
+use crate::common::{column, outcome, program, text};
 
 fn number(outcome: &Value, path: &str) -> f64 {
     let found = outcome.pointer(path).and_then(Value::as_f64);
@@ -99,11 +99,25 @@ fn direct_steps_reach_the_same_shape_and_say_what_they_are() {
         "{direct}"
     );
     assert_eq!(direct["direct_steps"]["energy_increases"], 0, "{direct}");
+    assert!(number(&direct, "/direct_steps/reach_in_cells") > 8.0);
     let error = number(&minimizing, "/time_steps/estimated_error");
     assert!(
         error > 0.0 && minimizing.get("direct_steps").is_none(),
         "{minimizing}"
     );
+}
+
+/// The disc grows until it is near to its own image.
+#[test]
+fn direct_steps_that_are_too_long_for_the_grid_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let flow = "flow builtin:disc --cells 24 --stepper direct --no-page";
+    let output = program(folder.path())
+        .args(flow.split(' '))
+        .output()
+        .unwrap();
+    let said = text(&output.stdout);
+    assert!(said.contains("within 8 cells: use more --cells"), "{said}");
 }
 
 /// From a corner controlled steps are made again until their error is what it may be, which is nothing to tell.

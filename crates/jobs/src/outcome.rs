@@ -23,6 +23,9 @@ const UNRESOLVED: f64 = 0.995;
 const SWOLLEN: f64 = 50.0;
 /// An interface whose slope is off by more than this part is none any more.
 const LOST: f64 = 0.4;
+/// Below so many cells of reach, the shortest part of a direct step, `17 h^4`, is longer than `4e-3` times the fourth power of the reach, up to which such
+/// steps are exact ([`engine::DirectParams`]).
+const NARROW: f64 = 8.0;
 /// More than this part of the vertices, in percent, that could not follow is told.
 const LEFT_BEHIND: f64 = 1.0;
 
@@ -208,6 +211,9 @@ pub struct DirectReport {
     pub convolutions: usize,
     /// How far the run of half parts is from that of whole parts at the end: more than the time error of the result, which is extrapolated.
     pub run_distance: f64,
+    /// The reach of the interface at the end, in cells: the largest radius of balls that touch it wherever they lie on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reach_in_cells: Option<f64>,
     /// Steps after which the energy was higher than before, which nothing excludes.
     pub energy_increases: usize,
 }
@@ -281,6 +287,7 @@ impl Summary {
             convolutions,
             run_distance,
             energy_increases,
+            ..
         } = self.direct_steps?;
         let energy = match energy_increases {
             0 => "the energy fell in each step".to_owned(),
@@ -319,6 +326,8 @@ impl Summary {
         } = self.remedies;
         let has_lost_profile =
             (self.interface_slope).is_some_and(|slope| (slope - 1.0).abs() > LOST);
+        let reach = self.direct_steps.and_then(|steps| steps.reach_in_cells);
+        let is_narrow = reach.is_some_and(|cells| cells < NARROW);
         let is_scaled = room == Room::SideLength;
         let has_swollen = self.measure("length").is_some()
             && self
@@ -358,6 +367,10 @@ impl Summary {
                 has_lost_profile,
                 "the interface has lost its profile, so that sizes and energy say nothing: the shape has details, or the energy has terms, that are too much for \
                  the grid, and more `cells` help",
+            ),
+            (
+                is_narrow,
+                "direct steps are not exact where the shape bends, or comes near to itself or to its periodic image, within 8 cells: use more `cells`",
             ),
             (
                 self.shortened_steps > 0,

@@ -252,7 +252,7 @@ impl<const D: usize, O: Presentation<D>> Plan<'_, D, O> {
             steps: run.steps(),
             time: run.time(),
             time_steps: time_accuracy(run.records(), eps).filter(|_| has_interface(u)),
-            direct_steps: direct_report(run.records()),
+            direct_steps: direct_report(run.records(), case.grid().spacing()),
             shortened_steps: run.records().iter().filter(|r| is_shortened(r)).count(),
             first_energy,
             energy,
@@ -524,12 +524,13 @@ fn time_accuracy(records: &[Record], eps: f64) -> Option<TimeAccuracy> {
 }
 
 /// What direct steps say of themselves.
-fn direct_report(records: &[Record]) -> Option<DirectReport> {
+fn direct_report(records: &[Record], spacing: f64) -> Option<DirectReport> {
     let steps = records.iter().filter_map(Record::direct);
     let last = steps.clone().next_back()?;
     Some(DirectReport {
         convolutions: steps.map(|step| step.convolutions).sum(),
         run_distance: last.run_distance,
+        reach_in_cells: Some(last.reach / spacing),
         energy_increases: energy_increases(records),
     })
 }

@@ -302,7 +302,7 @@ const NUMBERS: [(&str, &str); 31] = [
     ("/steps", "Steps in time"),
 ];
 
-const REST: [(&str, &str); 14] = [
+const REST: [(&str, &str); 15] = [
     (
         "/shortened_steps",
         "Steps that were made shorter than they were to be",
@@ -326,6 +326,10 @@ const REST: [(&str, &str); 14] = [
     (
         "/direct_steps/run_distance",
         "Distance of the runs of whole and of half parts at the end, more than the error of the time steps, in units of the input",
+    ),
+    (
+        "/direct_steps/reach_in_cells",
+        "Largest radius of balls that touch the shape wherever they lie on it, in cells, at the end",
     ),
     (
         "/direct_steps/energy_increases",
