@@ -143,7 +143,7 @@ pub struct Remedies {
 }
 
 impl Remedies {
-    /// Those of a run that this rule ended, and that was to end at a time or not.
+    /// Those of a run that this rule ended; `has_end_time` says whether it was to end at a time.
     pub fn of(ended: Option<&Stop>, has_end_time: bool, room: Room) -> Self {
         let more_steps = matches!(ended, Some(Stop::Steps(_)));
         Self {
@@ -182,13 +182,24 @@ impl Room {
     }
 }
 
-/// A doubt, and what gives the shape room.
+/// A doubt, and what gives the shape room in its box.
 macro_rules! with_room {
     ($doubt:literal, $room:expr) => {
         match $room {
             Room::SideLength => concat!($doubt, "a smaller `side_length` gives it room"),
             Room::BoxSide => concat!($doubt, "a larger `box_side` gives it room"),
             Room::Field => concat!($doubt, "a field in a larger box gives it room"),
+        }
+    };
+}
+
+/// A doubt, and how a run goes on if nothing but the number of steps ended it.
+macro_rules! with_more_steps {
+    ($doubt:literal, $more_steps:expr) => {
+        if $more_steps {
+            concat!($doubt, ": `willmore resume` goes on with more `steps`")
+        } else {
+            $doubt
         }
     };
 }
@@ -344,24 +355,16 @@ impl Summary {
                 "the mesh does not have the volume that it was to have, since vertices went back where faces would cross: `remesh` makes a new mesh",
             ),
             (
-                self.energy_reached == Some(false) && more_steps,
-                "the energy asked for was not reached: `willmore resume` goes on with more `steps`",
-            ),
-            (
-                self.energy_reached == Some(false) && !more_steps,
-                "the energy asked for was not reached",
+                self.energy_reached == Some(false),
+                with_more_steps!("the energy asked for was not reached", more_steps),
             ),
             (
                 is_early,
-                "the time asked for was not reached: `willmore resume` goes on with more `steps`",
+                with_more_steps!("the time asked for was not reached", more_steps),
             ),
             (
-                self.sizes_reached == Some(false) && more_steps,
-                "the sizes have not reached their targets: `willmore resume` goes on with more `steps`",
-            ),
-            (
-                self.sizes_reached == Some(false) && !more_steps,
-                "the sizes have not reached their targets",
+                self.sizes_reached == Some(false),
+                with_more_steps!("the sizes have not reached their targets", more_steps),
             ),
             (
                 has_lost_profile,

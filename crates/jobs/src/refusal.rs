@@ -55,7 +55,7 @@ pub enum Refusal {
     },
     /// A spontaneous curvature whose radius is smaller than the grid resolves.
     #[error(
-        "`spontaneous_curvature` {curvature} has the radius {}, and interfaces are {} wide, of which it has to be two: give a smaller one, or more `cells`",
+        "`spontaneous_curvature` {curvature} has the radius {}, which is less than two widths {} of the interface: give a smaller curvature, or more `cells`",
         solver::rounded(1.0 / curvature.abs()), solver::rounded(*eps)
     )]
     SharpCurvature {

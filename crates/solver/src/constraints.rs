@@ -149,7 +149,7 @@ impl Constraints {
         }
     }
 
-    /// How much energy there is, with these multipliers, in what a minimization misses of the targets.
+    /// The energy of what a minimization may miss of the targets `C*`, with these multipliers: the sum of `1e-7 |lambda C*|`.
     pub(crate) fn energy_error(&self, multipliers: [f64; 2]) -> f64 {
         let parts = multipliers.into_iter().zip(self.targets());
         let parts = parts.map(|(multiplier, target)| multiplier * target.unwrap_or_default());

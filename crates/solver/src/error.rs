@@ -8,11 +8,11 @@ pub fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
 }
 
-/// The next number with five digits, upwards or downwards: bounds stay bounds.
+/// The next number with five digits, upwards or downwards, so that what a message says of a bound can be given.
 fn outwards(number: f64, up: bool) -> f64 {
     let near = rounded(number);
     let beyond = if up { near >= number } else { near <= number };
-    if beyond || number == 0.0 {
+    if beyond {
         return near;
     }
     let unit = 10_f64.powf(number.abs().log10().floor() - 4.0);

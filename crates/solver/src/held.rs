@@ -117,7 +117,7 @@ impl Held {
     }
 
     /// Refuses perimeter and volume of a ball together, or of another shape with the [least perimeter](least_perimeter) in the box, in the end or at the
-    /// beginning. There, what changes one of the two changes the other one in proportion. What no shape has is refused by [`crate::Problem::hold`].
+    /// beginning: near such a shape both sizes change in proportion, so that nothing leads away from it. What no shape has is refused by [`crate::Problem::hold`].
     ///
     /// # Errors
     /// [`Error::LeastPerimeter`], [`Error::LeastStart`].

@@ -18,7 +18,7 @@ use crate::{
     bricks,
 };
 
-/// The part of the energy by which targets that are met up to a tolerance may change it.
+/// The largest part of the energy that may lie in what is missing of the targets.
 const TOLD: f64 = 0.1;
 /// Rounds in which nodes go to their bounds and from them.
 const ROUNDS: usize = 12;
@@ -117,7 +117,7 @@ impl<const D: usize> Minimizations<D> {
     /// the edge of the bricks, these are made more, and the minimization goes on from there.
     ///
     /// # Errors
-    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`], [`Error::NotHeld`]; those of tracing the energy.
+    /// [`Error::NonFinite`] naming the field, [`Error::NotConverged`], [`Error::NotHeld`], [`Error::Rushed`]; those of tracing the energy.
     pub fn minimize(
         &mut self,
         problem: &Problem<D>,
